@@ -1,0 +1,3 @@
+//! The FIT-MAC decision core.
+#![no_std]
+#![forbid(unsafe_code)]

@@ -1,0 +1,1 @@
+//! Shared-memory services, the real-time loop, watchdogs and the recorder.

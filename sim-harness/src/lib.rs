@@ -1,0 +1,1 @@
+//! A MuJoCo Panda, scenes, surrogate policies and episodes.

@@ -1,0 +1,3 @@
+//! `cargo xtask`: set-up and the project's commands.
+
+fn main() {}
