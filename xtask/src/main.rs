@@ -1,3 +1,77 @@
 //! `cargo xtask`: set-up and the project's commands.
+//!
+//! One file a command in [`cmd`]. What the commands share: where things are
+//! ([`workspace`]), Python ([`python`]), MuJoCo's library ([`mujoco`]), the
+//! environment of the test oracles ([`oracles`]) and child processes
+//! ([`process`]).
 
-fn main() {}
+mod cmd;
+mod mujoco;
+mod oracles;
+mod process;
+mod python;
+mod workspace;
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::{Parser, Subcommand};
+use workspace::Workspace;
+
+/// Set-up and the project's commands.
+#[derive(Parser)]
+#[command(
+    name = "cargo xtask",
+    bin_name = "cargo xtask",
+    about,
+    after_help = "Examples:
+  cargo xtask demo             fetch what is missing, build, run the demo
+  cargo xtask demo --seed 7    the same in another scene
+  cargo xtask test             every test of the workspace
+  cargo xtask ci               what continuous integration runs
+
+Exit status: 0 done, 1 failed, 2 wrong usage. `demo` and `bench` give the status
+of the program that they start."
+)]
+struct Cli {
+    /// The workspace to work on, instead of the one this command was built from.
+    #[arg(long, global = true, hide = true, value_name = "DIR")]
+    root: Option<PathBuf>,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Fetch MuJoCo's library, once.
+    Setup(cmd::setup::Args),
+    /// Build and run the demo: the policy alone fails, then FIT-MAC saves it.
+    Demo(cmd::demo::Args),
+    /// Set up the test oracles and run every test of the workspace.
+    Test(cmd::test::Args),
+    /// Formatting, lints, documentation and every test.
+    Ci(cmd::ci::Args),
+    /// Build and run one benchmark, or list them.
+    Bench(cmd::bench::Args),
+    /// Say what the machine lacks to build and test.
+    Doctor(cmd::doctor::Args),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let workspace = Workspace::at(cli.root);
+    let result = match cli.command {
+        Command::Setup(args) => cmd::setup::run(&workspace, &args),
+        Command::Demo(args) => cmd::demo::run(&workspace, &args),
+        Command::Test(args) => cmd::test::run(&workspace, &args),
+        Command::Ci(args) => cmd::ci::run(&workspace, &args),
+        Command::Bench(args) => cmd::bench::run(&workspace, &args),
+        Command::Doctor(args) => cmd::doctor::run(&workspace, &args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("xtask: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,8 @@
+//! The commands, one a file.
+
+pub(crate) mod bench;
+pub(crate) mod ci;
+pub(crate) mod demo;
+pub(crate) mod doctor;
+pub(crate) mod setup;
+pub(crate) mod test;

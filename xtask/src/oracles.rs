@@ -1,0 +1,53 @@
+//! The Python environment of the test oracles.
+//!
+//! The environment counts as made once a copy of the requirements that it was
+//! made from lies in it; that copy is written last.
+
+use std::fs;
+
+use anyhow::{Context, bail};
+
+use crate::{
+    process::step,
+    python::Python,
+    workspace::{Workspace, not_writable},
+};
+
+/// Makes sure that the environment fits the pinned requirements.
+pub(crate) fn install(workspace: &Workspace) -> anyhow::Result<()> {
+    let requirements = workspace.oracle_requirements();
+    if !requirements.exists() {
+        return Ok(()); // no oracle is in use
+    }
+    let wanted = fs::read_to_string(&requirements)
+        .with_context(|| format!("{} cannot be read", requirements.display()))?;
+    let environment = workspace.oracle_environment();
+    let made_from = environment.join("made-from-requirements.txt");
+    if fs::read_to_string(&made_from).is_ok_and(|made| made == wanted) {
+        return Ok(());
+    }
+    step(&format!(
+        "Installing the test oracles into {} (once)",
+        workspace.shown(&environment)
+    ));
+    fs::create_dir_all(&environment).map_err(|error| not_writable(&environment, &error))?;
+    Python::find()?.create_environment(&environment)?;
+    let python = Python::of_environment(&environment);
+    let arguments = [
+        "install",
+        "--only-binary=:all:",
+        "--retries=2",
+        "--requirement",
+    ];
+    let arguments = arguments
+        .iter()
+        .map(AsRef::as_ref)
+        .chain([requirements.as_os_str()]);
+    if !python.pip(arguments)? {
+        bail!(
+            "pip could not install the test oracles (its reason is above): check the network or \
+             the proxy and run this again"
+        );
+    }
+    fs::write(&made_from, wanted).map_err(|error| not_writable(&made_from, &error))
+}
