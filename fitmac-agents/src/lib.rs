@@ -1,1 +1,8 @@
-//! Planner, grounder and critic.
+//! Planner, grounder and critic: the slow side of the loop.
+//!
+//! Language and vision live here and never in the control path. Everything
+//! works offline by rules; a language model, a vision-language model and a
+//! learned detector may be added and are never trusted further than the rules
+//! allow.
+
+pub mod planner;

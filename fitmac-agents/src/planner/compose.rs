@@ -1,0 +1,372 @@
+//! From clauses to subtasks: pronouns, lists, and picks that a later clause
+//! completes.
+
+use super::attach::{self, Roles};
+use super::clause::{Clause, Group};
+use super::confidence::Doubt;
+use super::lexer::Verb;
+use super::lexicon;
+use super::phrase::{Name, Noun, Place};
+use super::types::{
+    Action, Relation, SUBTASK_CAPACITY, SpatialPhrase, Subtask, canonical_sentence,
+};
+
+/// An object that was named and waits for its destination.
+struct Held {
+    target: String,
+    source: Option<SpatialPhrase>,
+    /// Named by a verb, so that it is a step of its own if nothing follows.
+    picked: bool,
+}
+
+/// Builds the subtasks of an instruction clause by clause.
+#[derive(Default)]
+pub(super) struct Composer<'a> {
+    subtasks: Vec<Subtask>,
+    held: Vec<Held>,
+    fronted: Option<Place<'a>>,
+    /// Names in the order in which they were mentioned.
+    mentions: Vec<String>,
+    pub(super) doubts: Vec<Doubt>,
+}
+
+impl<'a> Composer<'a> {
+    /// Takes the next clause.
+    pub(super) fn clause(&mut self, clause: Clause<'a>) -> Result<(), Doubt> {
+        match clause {
+            Clause::Fronted(place) => {
+                if self.fronted.replace(place).is_some() {
+                    return Err(Doubt::Incomplete);
+                }
+                Ok(())
+            }
+            Clause::Command {
+                verb,
+                fronted,
+                groups,
+            } => {
+                let fronted = fronted.or_else(|| self.fronted.take());
+                let last = groups.len().saturating_sub(1);
+                for (index, group) in groups.into_iter().enumerate() {
+                    let fronted = if index == last { fronted.clone() } else { None };
+                    self.command(verb, &group, fronted)?;
+                }
+                Ok(())
+            }
+            Clause::Statement {
+                subject,
+                mut destination,
+            } => {
+                let mut roles = attach::sources(subject.after.clone(), &mut self.doubts)?;
+                let mut places = destination.drain(..);
+                (roles.destination, roles.destination_qualifier) = (places.next(), places.next());
+                if places.next().is_some() {
+                    return Err(Doubt::Incomplete);
+                }
+                self.place_named(Action::PickAndPlace, &subject, &roles)
+            }
+            Clause::Bare { groups, wanted } => self.bare(groups, wanted),
+        }
+    }
+
+    /// Ends the instruction.
+    pub(super) fn finish(mut self) -> Result<(Vec<Subtask>, Vec<Doubt>), Doubt> {
+        self.flush_held()?;
+        if self.fronted.is_some() || self.subtasks.is_empty() {
+            return Err(Doubt::Incomplete);
+        }
+        Ok((self.subtasks, self.doubts))
+    }
+
+    fn command(
+        &mut self,
+        verb: Verb,
+        group: &Group<'a>,
+        fronted: Option<Place<'a>>,
+    ) -> Result<(), Doubt> {
+        let pronoun = matches!(group.names.as_slice(), [] | [Noun::It | Noun::Them]);
+        if verb == Verb::Pick && pronoun && group.after.is_empty() && fronted.is_none() {
+            // "Find the milk, pick it up, ...".
+            return if self.held.is_empty() || group.names.is_empty() {
+                Err(Doubt::Incomplete)
+            } else {
+                self.held.iter_mut().for_each(|held| held.picked = true);
+                Ok(())
+            };
+        }
+        let roles = attach::roles(verb, group, fronted, &mut self.doubts)?;
+        let action = match verb {
+            Verb::Pick | Verb::Find if roles.destination.is_none() => {
+                return self.hold(group, &roles, verb == Verb::Pick);
+            }
+            Verb::Pick | Verb::Find | Verb::Place | Verb::Move => Action::PickAndPlace,
+            Verb::Slide if goes_in(&roles) => Action::PickAndPlace,
+            Verb::Slide | Verb::Push => Action::Push,
+            Verb::Open => Action::Open,
+            Verb::Close => Action::Close,
+            Verb::TurnOn => Action::TurnOn,
+            Verb::TurnOff | Verb::Turn => Action::TurnOff,
+        };
+        match action {
+            Action::Open | Action::Close | Action::TurnOn | Action::TurnOff => {
+                self.fixture(action, group, &roles)
+            }
+            _ if pronoun => self.place_held(action, &roles),
+            _ => self.place_named(action, group, &roles),
+        }
+    }
+
+    fn bare(&mut self, groups: Vec<Group<'a>>, wanted: bool) -> Result<(), Doubt> {
+        if let [group] = groups.as_slice()
+            && group.after.is_empty()
+            && group.before.is_empty()
+        {
+            return self.hold(group, &Roles::default(), false);
+        }
+        if !wanted {
+            self.doubts.push(Doubt::NoVerb);
+        }
+        for mut group in groups {
+            if let Some(place) = group.after.last_mut().filter(|_| wanted) {
+                place.marked = place.negated;
+            }
+            let roles = attach::roles(Verb::Place, &group, None, &mut self.doubts)?;
+            self.place_named(Action::PickAndPlace, &group, &roles)?;
+        }
+        Ok(())
+    }
+
+    /// Remembers objects until a clause says what to do with them.
+    fn hold(&mut self, group: &Group<'a>, roles: &Roles<'a>, picked: bool) -> Result<(), Doubt> {
+        self.flush_held()?;
+        let source = self.source(roles)?;
+        for target in self.targets(group)? {
+            self.mentions.push(target.clone());
+            self.held.push(Held {
+                target,
+                source: source.clone(),
+                picked,
+            });
+        }
+        Ok(())
+    }
+
+    fn flush_held(&mut self) -> Result<(), Doubt> {
+        for held in std::mem::take(&mut self.held) {
+            if !held.picked {
+                return Err(Doubt::Incomplete);
+            }
+            self.push(Action::Pick, held.target, held.source, None, "")?;
+        }
+        Ok(())
+    }
+
+    /// "Place it on the plate": completes what is held, or moves the last
+    /// target once more.
+    fn place_held(&mut self, action: Action, roles: &Roles<'a>) -> Result<(), Doubt> {
+        let (destination, prep) = self.destination(roles)?;
+        let mut held = std::mem::take(&mut self.held);
+        if held.is_empty() {
+            let last = self
+                .subtasks
+                .last()
+                .filter(|last| last.action.is_pick_place());
+            let target = last.ok_or(Doubt::Incomplete)?.target.clone();
+            self.doubts.push(Doubt::PronounGuess);
+            held.push(Held {
+                target,
+                source: None,
+                picked: true,
+            });
+        }
+        for held in held {
+            self.push(
+                action,
+                held.target,
+                held.source,
+                Some(destination.clone()),
+                prep,
+            )?;
+        }
+        Ok(())
+    }
+
+    fn place_named(
+        &mut self,
+        action: Action,
+        group: &Group<'a>,
+        roles: &Roles<'a>,
+    ) -> Result<(), Doubt> {
+        self.flush_held()?;
+        let source = self.source(roles)?;
+        let (destination, prep) = self.destination(roles)?;
+        for target in self.targets(group)? {
+            self.push(
+                action,
+                target,
+                source.clone(),
+                Some(destination.clone()),
+                prep,
+            )?;
+        }
+        Ok(())
+    }
+
+    fn fixture(
+        &mut self,
+        action: Action,
+        group: &Group<'a>,
+        roles: &Roles<'a>,
+    ) -> Result<(), Doubt> {
+        self.flush_held()?;
+        let source = self.source(roles)?;
+        let targets = match group.names.as_slice() {
+            [Noun::It] => {
+                let fits: fn(&str) -> bool = match action {
+                    Action::Open | Action::Close => lexicon::is_closable,
+                    _ => lexicon::is_switchable,
+                };
+                let found = self.mentions.iter().rev().find(|name| fits(name));
+                vec![found.ok_or(Doubt::Incomplete)?.clone()]
+            }
+            _ => self.targets(group)?,
+        };
+        for target in targets {
+            self.push(action, target, source.clone(), None, "")?;
+        }
+        Ok(())
+    }
+
+    fn targets(&self, group: &Group<'_>) -> Result<Vec<String>, Doubt> {
+        let mut targets = Vec::with_capacity(group.names.len());
+        for noun in &group.names {
+            let Noun::Name(name) = noun else {
+                return Err(Doubt::Incomplete);
+            };
+            match plural_stem(name) {
+                // "Both moka pots": the same kind twice.
+                Some(one) if group.both && group.names.len() == 1 => {
+                    targets.extend([one.clone(), one]);
+                }
+                Some(_) => return Err(Doubt::Unsupported(name.text.clone())),
+                None => targets.push(name.text.clone()),
+            }
+        }
+        let counted = !group.both || targets.len() == 2;
+        if targets.is_empty() || !counted {
+            Err(Doubt::Incomplete)
+        } else {
+            Ok(targets)
+        }
+    }
+
+    fn source(&self, roles: &Roles<'a>) -> Result<Option<SpatialPhrase>, Doubt> {
+        self.phrase(roles.source.as_ref(), roles.source_qualifier.as_ref())
+    }
+
+    fn destination(&self, roles: &Roles<'a>) -> Result<(SpatialPhrase, &'a str), Doubt> {
+        let place = roles.destination.as_ref().ok_or(Doubt::Incomplete)?;
+        if place.negated {
+            return Err(Doubt::Unsupported("not".to_owned()));
+        }
+        let phrase = self.phrase(Some(place), roles.destination_qualifier.as_ref())?;
+        Ok((phrase.ok_or(Doubt::Incomplete)?, place.preposition))
+    }
+
+    fn phrase(
+        &self,
+        place: Option<&Place<'a>>,
+        qualifier: Option<&Place<'a>>,
+    ) -> Result<Option<SpatialPhrase>, Doubt> {
+        let Some(place) = place else { return Ok(None) };
+        let mut references = Vec::with_capacity(place.references.len());
+        for noun in &place.references {
+            references.push(match noun {
+                Noun::Name(name) => name.text.clone(),
+                Noun::It => self.antecedent(place)?,
+                Noun::Them => return Err(Doubt::Incomplete),
+            });
+        }
+        // "Put the bowl inside": in what was mentioned last.
+        if references.is_empty() && place.relation == Some(Relation::In) {
+            references.push(self.mentions.last().ok_or(Doubt::Incomplete)?.clone());
+        }
+        let relation = attach::settled_relation(place, &references)?;
+        let centre_of_all = relation == Relation::AtCentre && references.is_empty();
+        if centre_of_all {
+            references.push("table".to_owned());
+        }
+        if references.len() != relation.arity() {
+            return Err(Doubt::Incomplete);
+        }
+        let qualifier = self.phrase(qualifier, None)?.map(Box::new);
+        Ok(Some(SpatialPhrase {
+            relation,
+            negated: place.negated,
+            references,
+            qualifier,
+        }))
+    }
+
+    /// The object that "it" stands for in a place: the fixture that was just
+    /// opened or turned on. Elsewhere "behind it" has two readings.
+    fn antecedent(&self, place: &Place<'a>) -> Result<String, Doubt> {
+        let settled = match self.subtasks.last().map(|last| last.action) {
+            Some(Action::Open | Action::TurnOn | Action::TurnOff) => true,
+            Some(_) => matches!(place.relation, Some(Relation::In)),
+            None => false,
+        };
+        let last = self
+            .mentions
+            .last()
+            .filter(|_| settled && self.held.is_empty());
+        last.cloned()
+            .ok_or_else(|| Doubt::Unsupported("it".to_owned()))
+    }
+
+    fn push(
+        &mut self,
+        action: Action,
+        target: String,
+        source: Option<SpatialPhrase>,
+        destination: Option<SpatialPhrase>,
+        prep: &str,
+    ) -> Result<(), Doubt> {
+        if self.subtasks.len() == SUBTASK_CAPACITY {
+            return Err(Doubt::TooManySteps);
+        }
+        self.mentions.push(target.clone());
+        if let Some(destination) = &destination {
+            self.mentions.extend(destination.references.iter().cloned());
+        }
+        let mut subtask = Subtask {
+            text: String::new(),
+            action,
+            target,
+            source,
+            destination,
+            destination_prep: prep.to_owned(),
+        };
+        subtask.text = canonical_sentence(&subtask);
+        self.subtasks.push(subtask);
+        Ok(())
+    }
+}
+
+fn goes_in(roles: &Roles<'_>) -> bool {
+    roles
+        .destination
+        .as_ref()
+        .is_some_and(|place| place.relation == Some(Relation::In))
+}
+
+/// The singular of a name whose head is a plural of the vocabulary.
+fn plural_stem(name: &Name) -> Option<String> {
+    let object = name.text.split(" of ").next()?;
+    let head = object.split(" with ").next()?.rsplit(' ').next()?;
+    if lexicon::is_vocabulary_noun(head) {
+        return None;
+    }
+    let stem = lexicon::singular(head).filter(|stem| lexicon::is_vocabulary_noun(stem))?;
+    Some(name.text.replacen(head, stem, 1))
+}

@@ -1,0 +1,400 @@
+//! The planner's words.
+
+use std::collections::HashMap;
+use std::sync::LazyLock;
+
+use super::lexer::{Direction, Verb};
+use super::types::Relation;
+
+/// Meaning of a phrase.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Entry {
+    Verb(Verb),
+    Prep(Option<Relation>, Direction),
+    /// A place without a reference; only where the phrase ends.
+    Place(Relation),
+    Determiner,
+    Of,
+    Possessive,
+    Not,
+    Relative,
+    Goes,
+    Want,
+    Both,
+    And,
+    Then,
+    Comma,
+    Stop,
+    It,
+    Them,
+    Unsupported,
+    /// Politeness, adverbs and particles: dropped.
+    Skip,
+}
+
+/// Phrases by meaning, separated by `|`; longer phrases win.
+const TABLE: &[(Entry, &str)] = {
+    use Direction::{From, Static, To};
+    use Entry as E;
+    use Relation as R;
+    &[
+        (
+            E::Verb(Verb::Pick),
+            "pick up|pick|pick out|grab|grasp|grip|take|take hold of|get hold of|get|fetch|retrieve|collect|lift|lift up|raise|hold|seize|remove",
+        ),
+        (E::Verb(Verb::Find), "find|locate|select|choose|identify"),
+        (
+            E::Verb(Verb::Place),
+            "place|put|set|lay|rest|drop|deposit|leave|release|lower|stand|position|store|stow|add|load|toss|insert|pack|stack|arrange|return|hang|mount|fit|place back|put back|dump|slot|park|tuck|plop|situate|put down|set down|place down|lay down|drop off|keep",
+        ),
+        (
+            E::Verb(Verb::Move),
+            "move|transfer|shift|bring|carry|relocate|transport|deliver|pick and place|haul",
+        ),
+        (E::Verb(Verb::Slide), "slide"),
+        (E::Verb(Verb::Push), "push|shove|nudge"),
+        (E::Verb(Verb::Open), "open|pull open|open up"),
+        (E::Verb(Verb::Close), "close|shut|push closed"),
+        (E::Verb(Verb::TurnOn), "turn on|switch on|power on"),
+        (E::Verb(Verb::TurnOff), "turn off|switch off|power off"),
+        (E::Verb(Verb::Turn), "turn|switch"),
+        (
+            E::Prep(Some(R::On), Static),
+            "on|upon|atop|on top of|on the top of|back on|on to the top of|at the top of",
+        ),
+        (
+            E::Prep(Some(R::On), To),
+            "onto|on to|over onto|back onto|to the top of|onto the top of|onto top of",
+        ),
+        (
+            E::Prep(Some(R::On), From),
+            "off|off of|off from|from on|from atop|from on top of|from the top of|off the top of|from top of",
+        ),
+        (
+            E::Prep(Some(R::In), Static),
+            "in|inside|inside of|within|back in|on the inside of",
+        ),
+        (E::Prep(Some(R::In), To), "into|back into|to the inside of"),
+        (
+            E::Prep(Some(R::In), From),
+            "out of|from inside|from inside of|from within|from in|out from|from out of",
+        ),
+        (E::Prep(None, To), "to|over to|back to|toward|towards"),
+        (E::Prep(None, From), "from|away off"),
+        (E::Prep(None, Static), "at"),
+        (
+            E::Prep(Some(R::NextTo), Static),
+            "next to|beside|near|near to|close to|by|adjacent to|alongside|to the side of|at the side of|by the side of|right next to|nearby|right beside|immediately next to",
+        ),
+        (
+            E::Prep(Some(R::NextTo), From),
+            "from next to|from beside|from near|from the side of",
+        ),
+        (
+            E::Prep(Some(R::Between), Static),
+            "between|in between|in the middle between",
+        ),
+        (
+            E::Prep(Some(R::Between), From),
+            "from between|from in between",
+        ),
+        (
+            E::Prep(Some(R::LeftOf), Static),
+            "left of|to the left of|on the left of|at the left of|on the left side of|to the left side of|at the left side of|on the left hand side of",
+        ),
+        (
+            E::Prep(Some(R::LeftOf), From),
+            "from the left of|from the left side of",
+        ),
+        (
+            E::Prep(Some(R::RightOf), Static),
+            "right of|to the right of|on the right of|at the right of|on the right side of|to the right side of|at the right side of|on the right hand side of",
+        ),
+        (
+            E::Prep(Some(R::RightOf), From),
+            "from the right of|from the right side of",
+        ),
+        (
+            E::Prep(Some(R::InFrontOf), Static),
+            "in front of|to the front of|at the front of|on the front of|before the front of|on the front side of",
+        ),
+        (
+            E::Prep(Some(R::InFrontOf), From),
+            "from the front of|from in front of",
+        ),
+        (
+            E::Prep(Some(R::Behind), Static),
+            "behind|in back of|at the back of|to the back of|to the rear of|at the rear of|in the rear of|on the back side of",
+        ),
+        (
+            E::Prep(Some(R::Behind), From),
+            "from behind|from the back of",
+        ),
+        (
+            E::Prep(Some(R::AtCentre), Static),
+            "at the center of|at the centre of|in the center of|in the centre of|in the middle of|at the middle of|on the center of|on the centre of|on the middle of|to the center of|to the centre of|to the middle of",
+        ),
+        (
+            E::Prep(Some(R::AtCentre), From),
+            "from the center of|from the centre of|from the middle of",
+        ),
+        (
+            E::Prep(Some(R::Under), Static),
+            "under|underneath|beneath|below",
+        ),
+        (
+            E::Prep(Some(R::Under), From),
+            "from under|from underneath|from beneath|from below",
+        ),
+        (
+            E::Prep(Some(R::NearestTo), Static),
+            "nearest|nearest to|closest|closest to",
+        ),
+        (
+            E::Prep(Some(R::FarthestFrom), Static),
+            "farthest from|furthest from|farthest away from|furthest away from",
+        ),
+        (
+            E::Place(R::AtLeft),
+            "on the left|at the left|to the left|on the left side|on the left hand side|from the left",
+        ),
+        (
+            E::Place(R::AtRight),
+            "on the right|at the right|to the right|on the right side|on the right hand side|from the right",
+        ),
+        (E::Place(R::AtFront), "at the front|in the front|in front"),
+        (E::Place(R::AtBack), "at the back|in the back|at the rear"),
+        (
+            E::Place(R::AtCentre),
+            "in the middle|at the center|at the centre|in the center|in the centre|from the center|from the centre|from the middle",
+        ),
+        (
+            E::Determiner,
+            "the|a|an|this|these|those|some|my|your|our|its|that",
+        ),
+        (E::Of, "of"),
+        (E::Possessive, "'s"),
+        (
+            E::Not,
+            "not|isn't|is not|wasn't|aren't|doesn't|does not|'s not|that isn't|that is not|that 's not|which isn't|which is not|which 's not|that does not|that doesn't|which does not|which doesn't|that are not|that was not",
+        ),
+        (
+            E::Relative,
+            "that is|that 's|which is|which 's|that was|which was|that are|which are|that sits|which sits|that stands|that lies|that rests|that has been|located|situated|sitting|standing|lying|resting|placed|positioned|found|kept|sit|sits|stands|lies|rests|currently|which|stored|lie|being",
+        ),
+        (
+            E::Goes,
+            "goes|go|should go|must go|needs to go|has to go|ought to go|is to go|belongs|should be|should be put|should be placed|should be moved|should be set|must be put|must be placed|must be moved|needs to be put|needs to be placed|needs to be moved|has to be put|has to be placed|has to be moved|to be put|to be placed|to be moved|is to be put|is to be placed|is to be moved|is put|is placed|ends up|should end up",
+        ),
+        (
+            E::Want,
+            "i want|i need|i would like|i 'd like|i'd like|we need|we want|make sure|make sure that|ensure|ensure that|i wish",
+        ),
+        (E::Both, "both|both of"),
+        (E::And, "and|&"),
+        (
+            E::Then,
+            "then|after that|afterwards|next|and then|and next|and after that|and afterwards|finally|lastly|secondly|and finally",
+        ),
+        (E::Comma, ","),
+        (E::Stop, ".|;|!|?"),
+        (E::It, "it"),
+        (
+            E::Them,
+            "them|them both|both of them|them all|they|these two",
+        ),
+        (
+            E::Unsupported,
+            "or|if|unless|until|while|before|after|when|once|don't|do not|do|never|everything|anything|nothing|something|all|every|each|any|two|three|four|five|six|seven|eight|nine|ten|several|many|except|without|instead|same|where|what|who|whose|why|how|other|another|else|neither|nor|either|ignore|disregard|forget|me|us|him|her|you|i|away|there|here|one|ones|first|second|third|fourth|last|again|avoid|rid|but|because|so|not the|rather|twice|as|for|about|against|through|along|around|across|above|than|is|are|was|be|been|will|would|can't|cannot|won't|shouldn't|no|only|whichever|wherever|putting|placing|picking|moving|taking|holding",
+        ),
+        (
+            E::Skip,
+            "please|kindly|could you|could you please|can you|can you please|would you|would you please|will you|you should|you must|you need to|you have to|i want you to|i need you to|i would like you to|i 'd like you to|i'd like you to|we need you to|your task is to|your job is to|your goal is to|the task is to|the goal is to|task|robot|hey robot|dear robot|now|let 's|go and|make the robot|have the robot|get the robot to|tell the robot to|the robot should|the robot must|use the gripper to|use your gripper to|use the robot to|use the arm to|use the robot arm to|with the gripper|what action should the robot take to|what should the robot do to|try to|ok|okay|gently|carefully|quickly|slowly|softly|simply|just|safely|directly|precisely|firmly|neatly|up|down|over there|right here|for me|also|hey|firstly|to start",
+        ),
+    ]
+};
+
+/// Vocabulary of nouns that head a name.
+const NOUNS: &str = "alphabet soup cheese dressing sauce ketchup butter milk pudding juice basket bowl plate ramekin box cabinet drawer stove table cookie burner bottle rack pot mug cup book caddy compartment microwave can carton tray pan shelf bin apple banana orange lemon pear peach tomato potato carrot onion egg bread block cube cylinder ball square circle triangle fork spoon knife spatula ladle towel cloth sponge soap brush pen pencil marker eraser phone remote lamp clock vase candle jar lid kettle pitcher glass saucer dish teapot toaster oven fridge refrigerator sink counter desk chair floor crate container bag pouch packet stick slice jug flask thermos shaker salt pepper sugar flour rice pasta macaroni cereal snack chips candy chocolate cake cookie biscuit donut yogurt cream mayonnaise mustard syrup honey jam oil vinegar wine beer coke soda water coffee tea toy bear car truck train doll puzzle die dice card cards key keys coin wallet watch hat shoe sock glove screw bolt nut nail hammer screwdriver wrench pliers tape ruler scissors cable plug battery charger mouse keyboard laptop tablet screen camera speaker headphones cap cover stand holder hook peg board mat pad coaster napkin tissue paper envelope folder notebook magazine stapler clip mushroom corn cucumber avocado strawberry grape mango kiwi lime pumpkin eggplant object item thing tin trash garbage spray cleaner detergent shampoo toothbrush toothpaste cupboard wardrobe dresser wall door handle side area spot region zone section corner edge top bottom middle center centre noodles beans tuna spam popcorn pringles nuts peanuts rubik letters frypan skillet saucepan wok cutlery barbecue bbq dispenser target goal pitaya pepper plant pumpkin squeezer cutter grater peeler whisk opener cork bucket bath tub hamper rim lego brick";
+
+/// Vocabulary of modifiers.
+const MODIFIERS: &str = "black white red green blue yellow orange purple pink brown grey gray silver gold golden dark light pale beige transparent clear small large big tiny little huge tall short long wide narrow thin thick round square flat wooden metal metallic plastic glass ceramic porcelain paper cardboard steel iron wicker akita left right top bottom middle upper lower front back rear center centre central leftmost rightmost nearest biggest smallest largest tallest shortest empty full open closed heavy new old striped spotted cream cookie wine moka alphabet tomato salad bbq barbecue chocolate orange frying trash desk coffee kitchen dining white black grocery storage soft hard fresh canned glazed plain colored coloured bright hot cold boxed bottled inner outer first-aid milk soup butter ketchup tea soda water cheese juice sauce pudding toy and with dark-red round-shaped cylindrical rectangular office stainless pepper salt";
+
+/// References into which things go; "to the basket" means in it.
+const CONTAINERS: &str = "basket bowl drawer compartment bin microwave crate container oven fridge refrigerator sink bag caddy jar mug cup pot pan bucket trash garbage cupboard hamper carton";
+
+/// Names joined by "and" that are one object.
+const COMPOUNDS: &[&str] = &["macaroni and cheese", "mac and cheese"];
+
+/// Colours: "the yellow and white mug" is one mug.
+const COLOURS: &str =
+    "black white red green blue yellow orange purple pink brown grey gray silver gold golden beige";
+
+type Phrases = Vec<(Vec<&'static str>, Entry)>;
+
+struct Lexicon {
+    phrases: HashMap<&'static str, Phrases>,
+    surfaces: HashMap<Vec<&'static str>, &'static str>,
+    words: HashMap<&'static str, Word>,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Word {
+    noun: bool,
+    modifier: bool,
+    container: bool,
+    colour: bool,
+}
+
+static LEXICON: LazyLock<Lexicon> = LazyLock::new(|| {
+    let mut phrases: HashMap<&str, Phrases> = HashMap::new();
+    let mut surfaces = HashMap::new();
+    for (entry, list) in TABLE {
+        for text in list.split('|') {
+            let parts: Vec<&str> = text.split(' ').collect();
+            surfaces.insert(parts.clone(), text);
+            phrases.entry(parts[0]).or_default().push((parts, *entry));
+        }
+    }
+    for list in phrases.values_mut() {
+        list.sort_by_key(|(parts, _)| std::cmp::Reverse(parts.len()));
+    }
+    let mut words: HashMap<&str, Word> = HashMap::new();
+    for noun in NOUNS.split(' ') {
+        words.entry(noun).or_default().noun = true;
+    }
+    for modifier in MODIFIERS.split(' ') {
+        words.entry(modifier).or_default().modifier = true;
+    }
+    for container in CONTAINERS.split(' ') {
+        words.entry(container).or_default().container = true;
+    }
+    for colour in COLOURS.split(' ') {
+        words.entry(colour).or_default().colour = true;
+    }
+    Lexicon {
+        phrases,
+        surfaces,
+        words,
+    }
+});
+
+/// Phrases that begin with `word`, longest first.
+pub(super) fn phrases(word: &str) -> &'static [(Vec<&'static str>, Entry)] {
+    LEXICON.phrases.get(word).map_or(&[], Vec::as_slice)
+}
+
+/// A phrase of the table as one text.
+pub(super) fn surface(phrase: &[&'static str]) -> &'static str {
+    LEXICON.surfaces.get(phrase).copied().unwrap_or_default()
+}
+
+/// True if a place without a reference may end before this word.
+pub(super) fn ends_place(word: &str) -> bool {
+    phrases(word).iter().any(|(parts, entry)| {
+        parts.len() == 1
+            && matches!(
+                entry,
+                Entry::And
+                    | Entry::Comma
+                    | Entry::Stop
+                    | Entry::Then
+                    | Entry::Prep(..)
+                    | Entry::Verb(_)
+                    | Entry::Skip
+            )
+    })
+}
+
+fn word(text: &str) -> Word {
+    LEXICON.words.get(text).copied().unwrap_or_default()
+}
+
+/// True if the vocabulary has `text` as the head of a name, singular or plural.
+pub(super) fn is_noun(text: &str) -> bool {
+    word(text).noun || singular(text).is_some_and(|stem| word(stem).noun)
+}
+
+/// True if the vocabulary lists `text` itself as a noun.
+pub(super) fn is_vocabulary_noun(text: &str) -> bool {
+    word(text).noun
+}
+
+/// True if the vocabulary has `text` as a part of a name.
+pub(super) fn is_modifier(text: &str) -> bool {
+    let word = word(text);
+    word.modifier || word.noun
+}
+
+/// True if `text` is a colour.
+pub(super) fn is_colour(text: &str) -> bool {
+    word(text).colour
+}
+
+/// True if things go *into* an object with this name.
+pub(super) fn is_container(name: &str) -> bool {
+    let object = name.split(" of ").next().unwrap_or(name);
+    let head = object.rsplit(' ').next().unwrap_or(object);
+    word(head).container || object == "box"
+}
+
+/// True if the name is one object although it has "and" in it.
+pub(super) fn is_compound(name: &str) -> bool {
+    COMPOUNDS.contains(&name)
+}
+
+/// The singular of a regular plural.
+pub(super) fn singular(text: &str) -> Option<&str> {
+    let stem = text
+        .strip_suffix('s')
+        .filter(|stem| !stem.ends_with('s') && stem.len() > 2)?;
+    match stem.strip_suffix('e') {
+        Some(short)
+            if ["sh", "ch", "x", "ss"]
+                .iter()
+                .any(|end| short.ends_with(end)) =>
+        {
+            Some(short)
+        }
+        _ => Some(stem),
+    }
+}
+
+/// True if an object with this name can be opened and closed.
+pub(super) fn is_closable(name: &str) -> bool {
+    has_head(
+        name,
+        &[
+            "drawer",
+            "door",
+            "microwave",
+            "cabinet",
+            "box",
+            "oven",
+            "fridge",
+            "lid",
+        ],
+    )
+}
+
+/// True if an object with this name can be turned on and off.
+pub(super) fn is_switchable(name: &str) -> bool {
+    has_head(
+        name,
+        &[
+            "stove",
+            "burner",
+            "lamp",
+            "oven",
+            "microwave",
+            "kettle",
+            "toaster",
+            "light",
+        ],
+    )
+}
+
+fn has_head(name: &str, heads: &[&str]) -> bool {
+    let object = name.split(" of ").next().unwrap_or(name);
+    heads.contains(&object.rsplit(' ').next().unwrap_or(object))
+}

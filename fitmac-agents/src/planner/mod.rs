@@ -1,0 +1,110 @@
+//! From an instruction to subtasks, by rules.
+//!
+//! The grammar covers pick-and-place English and the few other actions of
+//! LIBERO's suites. It reads every word: a sentence with a word that fits
+//! nowhere isn't understood, and stays with the base policy as it stands.
+//! Nothing is invented: every name in a plan consists of words of the
+//! instruction.
+//!
+//! ```
+//! use fitmac_agents::planner::{Relation, plan};
+//!
+//! let plan = plan("Take the bowl beside the ramekin and set it on the plate").unwrap();
+//! let step = &plan.subtasks[0];
+//! assert_eq!(step.target, "bowl");
+//! assert_eq!(step.source.as_ref().unwrap().relation, Relation::NextTo);
+//! assert_eq!(step.destination.as_ref().unwrap().references, ["plate"]);
+//! ```
+
+mod attach;
+mod clause;
+mod compose;
+mod confidence;
+mod lexer;
+mod lexicon;
+mod phrase;
+mod schema;
+mod types;
+
+#[cfg(test)]
+mod tests;
+
+pub use confidence::{Doubt, confidence};
+pub use schema::{PlannerOutput, SchemaError};
+pub use types::{
+    Action, Relation, SUBTASK_CAPACITY, SURE, SpatialPhrase, Subtask, TaskPlan, UNDERSTOOD,
+};
+
+use compose::Composer;
+
+/// An instruction that can't be read at all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PlanError {
+    /// No word in it.
+    #[error("instruction is empty: give a sentence such as \"put the milk in the basket\"")]
+    Empty,
+    /// Longer than the planner reads.
+    #[error(
+        "instruction has {length} bytes, at most {} are read: shorten it",
+        lexer::TEXT_CAP
+    )]
+    TooLong {
+        /// Its length, bytes.
+        length: usize,
+    },
+}
+
+/// Parses an instruction.
+///
+/// # Errors
+/// [`PlanError`] for an empty or overlong text. Language that the grammar
+/// doesn't cover is no error: the plan is one [`Action::Unknown`] step with a
+/// confidence below [`UNDERSTOOD`].
+pub fn plan(instruction: &str) -> Result<TaskPlan, PlanError> {
+    if instruction.len() > lexer::TEXT_CAP {
+        return Err(PlanError::TooLong {
+            length: instruction.len(),
+        });
+    }
+    if instruction.trim().is_empty() {
+        return Err(PlanError::Empty);
+    }
+    let text = lexer::normalise(instruction);
+    let (subtasks, doubts) = match parse(&text) {
+        Ok(parsed) => parsed,
+        Err(doubts) => {
+            return Ok(TaskPlan::unknown(instruction, confidence(&doubts), doubts));
+        }
+    };
+    let confidence = confidence(&doubts);
+    if confidence < UNDERSTOOD {
+        return Ok(TaskPlan::unknown(instruction, confidence, doubts));
+    }
+    let canonical_instruction = subtasks
+        .iter()
+        .map(|step| step.text.as_str())
+        .collect::<Vec<_>>()
+        .join(", then ");
+    Ok(TaskPlan {
+        canonical_instruction,
+        subtasks,
+        confidence,
+        doubts,
+    })
+}
+
+fn parse(text: &str) -> Result<(Vec<Subtask>, Vec<Doubt>), Vec<Doubt>> {
+    let items = lexer::items(text);
+    let mut composer = Composer::default();
+    for clause in clause::split(&items) {
+        let mut doubts = Vec::new();
+        let parsed = clause::parse(clause, &mut doubts);
+        composer.doubts.append(&mut doubts);
+        let outcome = parsed.and_then(|clause| composer.clause(clause));
+        if let Err(doubt) = outcome {
+            composer.doubts.push(doubt);
+            return Err(composer.doubts);
+        }
+    }
+    composer.finish().map_err(|doubt| vec![doubt])
+}
