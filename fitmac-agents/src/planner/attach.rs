@@ -120,7 +120,7 @@ fn place_named<'a>(places: Vec<Place<'a>>, doubts: &mut Vec<Doubt>) -> Result<Ro
             (roles.source, roles.destination) = (Some(origin), Some(goal));
         }
         (Some(origin), Some(goal), Some(mark)) if goal.direction != Direction::From => {
-            if !(is_goal(&goal) && !is_goal(&origin)) {
+            if !is_goal(&goal) || is_goal(&origin) {
                 doubts.push(Doubt::AmbiguousAttachment);
             }
             roles.source = Some(origin);

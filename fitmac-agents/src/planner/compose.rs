@@ -111,7 +111,14 @@ impl<'a> Composer<'a> {
             Action::Open | Action::Close | Action::TurnOn | Action::TurnOff => {
                 self.fixture(action, group, &roles)
             }
-            _ if pronoun => self.place_held(action, &roles),
+            _ if pronoun => {
+                let several = matches!(group.names.as_slice(), [Noun::Them]);
+                // "Them" when one object or none is at hand.
+                if several && self.held.len() < 2 {
+                    return Err(Doubt::Unsupported("them".to_owned()));
+                }
+                self.place_held(action, &roles)
+            }
             _ => self.place_named(action, group, &roles),
         }
     }

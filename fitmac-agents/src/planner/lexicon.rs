@@ -223,6 +223,9 @@ const MODIFIERS: &str = "black white red green blue yellow orange purple pink br
 /// References into which things go; "to the basket" means in it.
 const CONTAINERS: &str = "basket bowl drawer compartment bin microwave crate container oven fridge refrigerator sink bag caddy jar mug cup pot pan bucket trash garbage cupboard hamper carton";
 
+/// Regions of an object: no objects of their own.
+const REGIONS: &str = "top bottom side edge corner front back rear left right middle center centre area region zone section spot rim surface inside outside end half";
+
 /// Names joined by "and" that are one object.
 const COMPOUNDS: &[&str] = &["macaroni and cheese", "mac and cheese"];
 
@@ -336,6 +339,12 @@ pub(super) fn is_container(name: &str) -> bool {
     let object = name.split(" of ").next().unwrap_or(name);
     let head = object.rsplit(' ').next().unwrap_or(object);
     word(head).container || object == "box"
+}
+
+/// True if the name is a region of an object, as in "the top of the ramekin".
+pub(super) fn is_region(name: &str) -> bool {
+    let head = name.rsplit(' ').next().unwrap_or(name);
+    REGIONS.split(' ').any(|region| region == head)
 }
 
 /// True if the name is one object although it has "and" in it.

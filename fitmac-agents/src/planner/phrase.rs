@@ -189,12 +189,14 @@ impl<'i, 'a> Reader<'i, 'a> {
             Some(Item::Of) => {
                 self.advance();
                 let whole = self.name()?;
+                check_part(&text)?;
                 text.push_str(" of ");
                 text.push_str(&whole.text);
             }
             Some(Item::Possessive) => {
                 self.advance();
                 let part = self.name()?;
+                check_part(&part.text)?;
                 text = format!("{} of {text}", part.text);
             }
             _ => {}
@@ -298,6 +300,15 @@ impl<'i, 'a> Reader<'i, 'a> {
             self.peek(),
             Some(Item::Determiner | Item::Word(_) | Item::It | Item::Them)
         )
+    }
+}
+
+/// "The top of the ramekin" is no object that could be found or held.
+fn check_part(part: &str) -> Result<(), Doubt> {
+    if lexicon::is_region(part) {
+        Err(Doubt::Unsupported(part.to_owned()))
+    } else {
+        Ok(())
     }
 }
 

@@ -104,3 +104,10 @@ fn tuning_half_is_right() {
     assert!(score.right * 100 >= score.total * 99);
     assert_eq!(score.confidently_wrong, 0);
 }
+
+#[test]
+fn held_out_half_is_right() {
+    let score = score("held_out", true);
+    assert!(score.right * 100 >= score.total * 97);
+    assert_eq!(score.confidently_wrong, 0);
+}
