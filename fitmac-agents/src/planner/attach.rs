@@ -16,10 +16,6 @@ pub(super) struct Roles<'a> {
     pub(super) destination_qualifier: Option<Place<'a>>,
 }
 
-/// Supports on which references stand: "next to the plate on the table" says
-/// where the plate is, not where the object goes.
-const SUPPORTS: &[&str] = &["table", "floor", "counter", "desk", "shelf"];
-
 /// Gives each place of `group` its role under `verb`.
 pub(super) fn roles<'a>(
     verb: Verb,
@@ -140,16 +136,21 @@ fn says_where(place: &Place<'_>) -> bool {
 }
 
 /// True if the first place is surely the origin and the second the destination.
+/// Two plain places have two readings ("beside the plate on the stove"), unless
+/// the second can't say where the first one's reference is, because it is that
+/// reference ("beside the plate on the plate").
 fn clearly_two_places(origin: &Place<'_>, goal: &Place<'_>) -> bool {
-    if says_where(origin) || is_goal(goal) || origin.references.is_empty() {
-        return true;
-    }
-    let supports = |place: &Place<'_>| matches!(place.relation, Some(Relation::On | Relation::In));
-    let on_support = goal.references.iter().any(|noun| match noun {
-        Noun::Name(name) => SUPPORTS.iter().any(|support| name.text.ends_with(support)),
-        Noun::It | Noun::Them => false,
-    });
-    supports(goal) && !on_support
+    says_where(origin)
+        || is_goal(goal)
+        || origin.references.is_empty()
+        || goal
+            .references
+            .iter()
+            .any(|reference| origin.references.contains(reference))
+}
+
+fn same(one: &Noun, other: &Noun) -> bool {
+    matches!((one, other), (Noun::Name(one), Noun::Name(other)) if one.text == other.text)
 }
 
 /// The relation of a place, settled by its reference where the words leave it
@@ -157,13 +158,19 @@ fn clearly_two_places(origin: &Place<'_>, goal: &Place<'_>) -> bool {
 pub(super) fn settled_relation(
     place: &Place<'_>,
     references: &[String],
+    doubts: &mut Vec<Doubt>,
 ) -> Result<Relation, Doubt> {
     match (place.relation, references.first()) {
         (Some(relation), _) => Ok(relation),
         (None, Some(_)) if place.direction == Direction::Static => {
             Err(Doubt::Unsupported(place.preposition.to_owned()))
         }
-        (None, Some(name)) if lexicon::is_container(name) => Ok(Relation::In),
+        (None, Some(name)) if lexicon::is_container(name) => {
+            if lexicon::is_open_box(name) {
+                doubts.push(Doubt::RelationGuess);
+            }
+            Ok(Relation::In)
+        }
         (None, _) => Ok(Relation::On),
     }
 }

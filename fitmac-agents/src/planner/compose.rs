@@ -267,11 +267,11 @@ impl<'a> Composer<'a> {
         }
     }
 
-    fn source(&self, roles: &Roles<'a>) -> Result<Option<SpatialPhrase>, Doubt> {
+    fn source(&mut self, roles: &Roles<'a>) -> Result<Option<SpatialPhrase>, Doubt> {
         self.phrase(roles.source.as_ref(), roles.source_qualifier.as_ref())
     }
 
-    fn destination(&self, roles: &Roles<'a>) -> Result<(SpatialPhrase, &'a str), Doubt> {
+    fn destination(&mut self, roles: &Roles<'a>) -> Result<(SpatialPhrase, &'a str), Doubt> {
         let place = roles.destination.as_ref().ok_or(Doubt::Incomplete)?;
         if place.negated {
             return Err(Doubt::Unsupported("not".to_owned()));
@@ -281,7 +281,7 @@ impl<'a> Composer<'a> {
     }
 
     fn phrase(
-        &self,
+        &mut self,
         place: Option<&Place<'a>>,
         qualifier: Option<&Place<'a>>,
     ) -> Result<Option<SpatialPhrase>, Doubt> {
@@ -298,7 +298,7 @@ impl<'a> Composer<'a> {
         if references.is_empty() && place.relation == Some(Relation::In) {
             references.push(self.mentions.last().ok_or(Doubt::Incomplete)?.clone());
         }
-        let relation = attach::settled_relation(place, &references)?;
+        let relation = attach::settled_relation(place, &references, &mut self.doubts)?;
         let centre_of_all = relation == Relation::AtCentre && references.is_empty();
         if centre_of_all {
             references.push("table".to_owned());

@@ -16,6 +16,8 @@ pub enum Doubt {
     AmbiguousAttachment,
     /// "The A and B" may be one object or two.
     AmbiguousList,
+    /// "From the box" may be off it or out of it.
+    RelationGuess,
     /// A pronoun that could only be guessed.
     PronounGuess,
     /// A word that changes the meaning in a way that the grammar doesn't cover,
@@ -38,12 +40,11 @@ impl Doubt {
     #[must_use]
     pub fn factor(&self) -> f64 {
         match self {
-            Self::UnknownNoun(_) => 0.85,
+            Self::UnknownNoun(_) | Self::PronounGuess | Self::RelationGuess => 0.8,
             Self::UnknownModifier(_) => 0.97,
             Self::NoVerb => 0.88,
             Self::AmbiguousAttachment | Self::ModelDisagrees => 0.7,
             Self::AmbiguousList => 0.45,
-            Self::PronounGuess => 0.8,
             Self::Unsupported(_) | Self::Unparsed(_) => 0.15,
             Self::Incomplete | Self::TooManySteps => 0.2,
         }

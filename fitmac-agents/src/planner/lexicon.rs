@@ -338,7 +338,12 @@ pub(super) fn is_colour(text: &str) -> bool {
 pub(super) fn is_container(name: &str) -> bool {
     let object = name.split(" of ").next().unwrap_or(name);
     let head = object.rsplit(' ').next().unwrap_or(object);
-    word(head).container || object == "box"
+    word(head).container || is_open_box(name)
+}
+
+/// True if things may equally be on or in an object with this name.
+pub(super) fn is_open_box(name: &str) -> bool {
+    matches!(name, "box" | "tray" | "bowl")
 }
 
 /// True if the name is a region of an object, as in "the top of the ramekin".

@@ -22,6 +22,13 @@ struct Step {
     destination: Option<SpatialPhrase>,
 }
 
+fn second_set() -> Vec<Case> {
+    let text = include_str!("../../data/instructions-second.jsonl");
+    text.lines()
+        .map(|line| serde_json::from_str(line).expect("instruction set"))
+        .collect()
+}
+
 fn cases(split: &str) -> Vec<Case> {
     let text = include_str!("../../data/instructions.jsonl");
     let cases: Vec<Case> = text
@@ -62,13 +69,13 @@ struct Score {
     confidently_wrong: usize,
 }
 
-fn score(split: &str, show: bool) -> Score {
+fn score(split: &str, cases: Vec<Case>) -> Score {
     let mut score = Score {
         right: 0,
         total: 0,
         confidently_wrong: 0,
     };
-    for case in cases(split) {
+    for case in cases {
         let plan = plan(&case.text).expect("a sentence");
         let matches = steps(&plan) == case.steps;
         let right = match case.expect.as_str() {
@@ -80,7 +87,7 @@ fn score(split: &str, show: bool) -> Score {
         score.total += 1;
         score.right += usize::from(right);
         score.confidently_wrong += usize::from(!right && plan.confidence > SURE);
-        if !right && show {
+        if !right {
             println!(
                 "{} {:.2} {}\n   {:?}\n   {:?}",
                 case.id,
@@ -100,14 +107,21 @@ fn score(split: &str, show: bool) -> Score {
 
 #[test]
 fn tuning_half_is_right() {
-    let score = score("tuning", true);
+    let score = score("tuning", cases("tuning"));
     assert!(score.right * 100 >= score.total * 99);
     assert_eq!(score.confidently_wrong, 0);
 }
 
 #[test]
 fn held_out_half_is_right() {
-    let score = score("held_out", true);
+    let score = score("held_out", cases("held_out"));
     assert!(score.right * 100 >= score.total * 97);
+    assert_eq!(score.confidently_wrong, 0);
+}
+
+#[test]
+fn second_set_is_mostly_right_and_never_confidently_wrong() {
+    let score = score("second", second_set());
+    assert!(score.right * 100 >= score.total * 96);
     assert_eq!(score.confidently_wrong, 0);
 }
