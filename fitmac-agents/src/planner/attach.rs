@@ -25,7 +25,13 @@ pub(super) fn roles<'a>(
 ) -> Result<Roles<'a>, Doubt> {
     let mut before = group.before.iter().cloned();
     let leading = fronted.or_else(|| before.next());
-    let mut after: Vec<Place<'a>> = before.chain(group.after.iter().cloned()).collect();
+    // "From the drawer, take the bowl": where it is, said first.
+    let (origin, leading) = match leading {
+        Some(place) if place.direction == Direction::From => (Some(place), None),
+        other => (None, other),
+    };
+    let rest = before.chain(group.after.iter().cloned());
+    let mut after: Vec<Place<'a>> = origin.into_iter().chain(rest).collect();
     let pronoun = matches!(group.names.as_slice(), [] | [Noun::It | Noun::Them]);
     if let Some(destination) = leading {
         if pronoun && group.names.is_empty() {
@@ -140,13 +146,16 @@ fn says_where(place: &Place<'_>) -> bool {
 /// the second can't say where the first one's reference is, because it is that
 /// reference ("beside the plate on the plate").
 fn clearly_two_places(origin: &Place<'_>, goal: &Place<'_>) -> bool {
+    let shared = |goal: &Noun| {
+        origin
+            .references
+            .iter()
+            .any(|reference| same(reference, goal))
+    };
     says_where(origin)
         || is_goal(goal)
         || origin.references.is_empty()
-        || goal
-            .references
-            .iter()
-            .any(|reference| origin.references.contains(reference))
+        || goal.references.iter().any(shared)
 }
 
 fn same(one: &Noun, other: &Noun) -> bool {

@@ -34,16 +34,18 @@ pub enum Doubt {
 }
 
 impl Doubt {
-    /// Factor on the confidence, in (0, 1]. Chosen on the tuning half of the
-    /// instruction set so that a reading that is only the likelier of two
-    /// stays below [`super::SURE`].
+    /// Factor on the confidence, in (0, 1]. A reading that is only the
+    /// likelier of two ends between [`super::UNDERSTOOD`] and
+    /// [`super::SURE`]; what the grammar doesn't cover ends below both.
     #[must_use]
     pub fn factor(&self) -> f64 {
         match self {
-            Self::UnknownNoun(_) | Self::PronounGuess | Self::RelationGuess => 0.8,
             Self::UnknownModifier(_) => 0.97,
             Self::NoVerb => 0.88,
-            Self::AmbiguousAttachment | Self::ModelDisagrees => 0.7,
+            Self::UnknownNoun(_) => 0.75,
+            Self::ModelDisagrees => 0.7,
+            Self::PronounGuess | Self::RelationGuess => 0.6,
+            Self::AmbiguousAttachment => 0.55,
             Self::AmbiguousList => 0.45,
             Self::Unsupported(_) | Self::Unparsed(_) => 0.15,
             Self::Incomplete | Self::TooManySteps => 0.2,

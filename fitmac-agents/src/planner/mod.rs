@@ -6,6 +6,11 @@
 //! Nothing is invented: every name in a plan consists of words of the
 //! instruction.
 //!
+//! Measured (`cargo test -p fitmac-agents planner -- --nocapture`): each held-out
+//! set on its first run 202 of 204, 88 of 92 (written to be hard) and 114 of
+//! 115, see `data/README.md`; after the corrections 408 of 411, none wrong above
+//! 0.8, none of the 62 instructions below 0.5 wrongly left to the base policy.
+//!
 //! ```
 //! use fitmac_agents::planner::{Relation, plan};
 //!
@@ -25,6 +30,7 @@ mod lexicon;
 mod phrase;
 mod schema;
 mod types;
+mod vocabulary;
 
 #[cfg(test)]
 mod tests;
