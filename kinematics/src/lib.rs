@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod elementary;
+pub mod otg;
 pub mod pose;
 pub mod rotation;
 pub mod vector;
