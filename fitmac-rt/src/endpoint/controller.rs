@@ -1,0 +1,151 @@
+//! The controller's side.
+
+use fitmac_core::message::{
+    ActionChunk, Command, CriticReport, GroundingRecord, Input, Output, Plan, PolicyQuery,
+    RebindRequest, StateSample, VerifierReport,
+};
+
+use crate::{
+    message::OperatorRequest,
+    port::{Receiver, ReceiverCounts, Sender, Session},
+    service,
+    transport::{ConnectError, Transport, TransportFault},
+};
+
+/// All ends of the controller.
+///
+/// [`poll`](Self::poll) takes at most one message of each service, so a tick's
+/// work is bounded; what waits longer is taken by the next tick.
+pub struct ControllerEndpoint<Tr: Transport> {
+    state: Receiver<StateSample, Tr>,
+    chunk: Receiver<ActionChunk, Tr>,
+    grounding: Receiver<GroundingRecord, Tr>,
+    plan: Receiver<Plan, Tr>,
+    verifier: Receiver<VerifierReport, Tr>,
+    critic: Receiver<CriticReport, Tr>,
+    request: Receiver<OperatorRequest, Tr>,
+    command: Sender<Command, Tr>,
+    query: Sender<PolicyQuery, Tr>,
+    rebind: Sender<RebindRequest, Tr>,
+    fresh: Fresh,
+}
+
+/// Which services had a message in this tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Fresh {
+    state: bool,
+    chunk: bool,
+    grounding: bool,
+    plan: bool,
+    verifier: bool,
+    critic: bool,
+    request: bool,
+}
+
+impl<Tr: Transport> ControllerEndpoint<Tr> {
+    /// Connects all ends.
+    ///
+    /// # Errors
+    /// If another controller is there, or a service cannot be opened.
+    pub fn connect(transport: &Tr, session: Session) -> Result<Self, ConnectError> {
+        Ok(Self {
+            // First: it is the one that a second controller fails on.
+            command: Sender::connect(transport, &service::COMMAND, session)?,
+            query: Sender::connect(transport, &service::QUERY, session)?,
+            rebind: Sender::connect(transport, &service::REBIND, session)?,
+            state: Receiver::connect(transport, &service::STATE)?,
+            chunk: Receiver::connect(transport, &service::CHUNK)?,
+            grounding: Receiver::connect(transport, &service::GROUNDING)?,
+            plan: Receiver::connect(transport, &service::PLAN)?,
+            verifier: Receiver::connect(transport, &service::VERIFIER)?,
+            critic: Receiver::connect(transport, &service::CRITIC)?,
+            request: Receiver::connect(transport, &service::REQUEST)?,
+            fresh: Fresh::default(),
+        })
+    }
+
+    /// Takes at most one waiting message of each service.
+    pub fn poll(&mut self) {
+        self.fresh.state = self.state.receive();
+        self.poll_others();
+    }
+
+    /// Takes a waiting state sample, and nothing else; says whether there was one.
+    pub fn poll_state(&mut self) -> bool {
+        self.fresh.state |= self.state.receive();
+        self.fresh.state
+    }
+
+    /// Takes at most one waiting message of each service but the state.
+    pub fn poll_others(&mut self) {
+        self.fresh.chunk = self.chunk.receive();
+        self.fresh.grounding = self.grounding.receive();
+        self.fresh.plan = self.plan.receive();
+        self.fresh.verifier = self.verifier.receive();
+        self.fresh.critic = self.critic.receive();
+        self.fresh.request = self.request.receive();
+    }
+
+    /// Forgets what was polled: the next tick starts with nothing new.
+    pub fn clear(&mut self) {
+        self.fresh = Fresh::default();
+    }
+
+    /// What was polled, as the core takes it.
+    #[must_use]
+    pub fn input(&self) -> Input<'_> {
+        let request = &self.request.newest().payload;
+        Input {
+            state: fresh(self.fresh.state, &self.state),
+            chunk: fresh(self.fresh.chunk, &self.chunk),
+            grounding: fresh(self.fresh.grounding, &self.grounding),
+            plan: fresh(self.fresh.plan, &self.plan),
+            verifier: fresh(self.fresh.verifier, &self.verifier),
+            critic: fresh(self.fresh.critic, &self.critic),
+            request: if self.fresh.request {
+                request.request
+            } else {
+                0
+            },
+        }
+    }
+
+    /// Sends what the core decided at `now_ns`: the command first.
+    ///
+    /// # Errors
+    /// If the transport failed; the rest was still sent.
+    pub fn publish(&mut self, now_ns: u64, output: &Output) -> Result<(), TransportFault> {
+        let command = self.command.send(now_ns, &output.command);
+        let query = match &output.query {
+            Some(query) => self.query.send(now_ns, query),
+            None => Ok(()),
+        };
+        let rebind = match &output.rebind {
+            Some(rebind) => self.rebind.send(now_ns, rebind),
+            None => Ok(()),
+        };
+        command.and(query).and(rebind)
+    }
+
+    /// What the receiving ends have seen: state, chunk, grounding, plan,
+    /// verifier, critic, request.
+    #[must_use]
+    pub fn counts(&self) -> [(&'static str, ReceiverCounts); 7] {
+        [
+            (service::STATE.name, self.state.counts()),
+            (service::CHUNK.name, self.chunk.counts()),
+            (service::GROUNDING.name, self.grounding.counts()),
+            (service::PLAN.name, self.plan.counts()),
+            (service::VERIFIER.name, self.verifier.counts()),
+            (service::CRITIC.name, self.critic.counts()),
+            (service::REQUEST.name, self.request.counts()),
+        ]
+    }
+}
+
+fn fresh<T: crate::layout::Payload, Tr: Transport>(
+    is_fresh: bool,
+    receiver: &Receiver<T, Tr>,
+) -> Option<&T> {
+    is_fresh.then_some(&receiver.newest().payload)
+}
