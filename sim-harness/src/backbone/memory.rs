@@ -1,0 +1,151 @@
+//! What a policy that learnt by rote keeps of its training: one layout and one motion a task.
+
+use crate::backbone::{Observation, SeenObject};
+use crate::error::SimError;
+use crate::grasp::grasp_offset_m;
+use crate::pose::distance_xy_m;
+use crate::scene::PlacedObject;
+use crate::suite::{Relation, Suite, Task};
+
+/// Distance beyond which an object counts as not in its place, m.
+const MISPLACED_M: f64 = 0.10;
+/// Height of the carried object's bottom above the destination's top, m.
+const CARRY_CLEARANCE_M: f64 = 0.035;
+/// Height of the released object's bottom above a surface, m.
+const RELEASE_CLEARANCE_M: f64 = 0.006;
+/// Height of the hover point above the target's top, m.
+const HOVER_M: f64 = 0.10;
+
+/// Where a thing stood in training.
+#[derive(Clone, Debug, PartialEq)]
+struct Landmark {
+    label: String,
+    xy_m: [f64; 2],
+}
+
+/// One trained task: what the scene looked like and where the hand went.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Demonstration {
+    /// The task's name.
+    pub task: String,
+    landmarks: Vec<Landmark>,
+    /// Centre of the target in training, m.
+    pub target_m: [f64; 3],
+    /// Where the tool was when the gripper closed, m.
+    pub grasp_m: [f64; 3],
+    /// Height from which the tool went down, m.
+    pub hover_z_m: f64,
+    /// Height at which it carried, m.
+    pub carry_z_m: f64,
+    /// Centre of the destination in training, m.
+    pub destination_m: [f64; 3],
+    /// Where the tool was when the gripper opened, m.
+    pub release_m: [f64; 3],
+}
+
+impl Demonstration {
+    /// What a good demonstration of a task in its nominal layout leaves behind.
+    ///
+    /// # Errors
+    /// If the task's names do not resolve.
+    pub fn of(suite: &Suite, task: &Task) -> Result<Self, SimError> {
+        let scene = suite.nominal_scene(task)?;
+        let target = scene.by_name(&task.target)?;
+        let destination = scene.by_name(&task.destination)?;
+        let offset = grasp_offset_m(&target.kind);
+        let grasp_m: [f64; 3] = std::array::from_fn(|i| target.pose.position_m[i] + offset[i]);
+        let above = top_m(destination) + carried_depth_m(target);
+        let release_z = match task.relation {
+            Relation::On => {
+                let surface = destination
+                    .kind
+                    .region_m()
+                    .map_or(top_m(destination), |(c, _)| {
+                        destination.pose.position_m[2] + c[2]
+                    });
+                surface + RELEASE_CLEARANCE_M + carried_depth_m(target)
+            }
+            Relation::In => above,
+        };
+        let [dx, dy, _] = destination.pose.position_m;
+        let landmark = |o: &PlacedObject| Landmark {
+            label: o.kind.label.clone(),
+            xy_m: [o.pose.position_m[0], o.pose.position_m[1]],
+        };
+        Ok(Self {
+            task: task.name.clone(),
+            landmarks: scene.objects().iter().map(landmark).collect(),
+            target_m: target.pose.position_m,
+            grasp_m,
+            hover_z_m: top_m(target) + HOVER_M,
+            carry_z_m: above + CARRY_CLEARANCE_M,
+            destination_m: destination.pose.position_m,
+            release_m: [dx + offset[0], dy + offset[1], release_z],
+        })
+    }
+
+    /// How little a scene resembles the remembered one: the mean distance from each remembered
+    /// place to the nearest thing of the same look, m.
+    #[must_use]
+    pub fn strangeness_m(&self, seen: &[SeenObject]) -> f64 {
+        let missing = |landmark: &Landmark| {
+            let place = [landmark.xy_m[0], landmark.xy_m[1], 0.0];
+            seen.iter()
+                .filter(|o| o.label == landmark.label)
+                .map(|o| distance_xy_m(o.pose.position_m, place))
+                .fold(MISPLACED_M, f64::min)
+        };
+        let total: f64 = self.landmarks.iter().map(missing).sum();
+        total / self.landmarks.len().max(1) as f64
+    }
+}
+
+fn top_m(object: &PlacedObject) -> f64 {
+    object.pose.position_m[2] + object.kind.half_extent_m()[2]
+}
+
+/// From the tool centre point down to the bottom of the held object, m.
+fn carried_depth_m(object: &PlacedObject) -> f64 {
+    grasp_offset_m(&object.kind)[2] + object.kind.half_extent_m()[2]
+}
+
+/// All that was learnt.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Memory {
+    demonstrations: Vec<Demonstration>,
+}
+
+impl Memory {
+    /// A policy that was trained on the tasks of a suite.
+    ///
+    /// # Errors
+    /// If a task's names do not resolve, or the suite has no task.
+    pub fn of(suite: &Suite) -> Result<Self, SimError> {
+        let demonstrations = suite
+            .tasks
+            .iter()
+            .map(|task| Demonstration::of(suite, task))
+            .collect::<Result<Vec<_>, _>>()?;
+        if demonstrations.is_empty() {
+            return Err(SimError::invalid(
+                format!("suite `{}`", suite.name),
+                "it has no task",
+            ));
+        }
+        Ok(Self { demonstrations })
+    }
+
+    /// The demonstration whose scene resembles the observed one most; ties go to the first.
+    #[must_use]
+    pub fn recall(&self, observation: &Observation) -> &Demonstration {
+        let mut best = &self.demonstrations[0];
+        let mut least = best.strangeness_m(&observation.objects);
+        for candidate in &self.demonstrations[1..] {
+            let strangeness = candidate.strangeness_m(&observation.objects);
+            if strangeness < least {
+                (best, least) = (candidate, strangeness);
+            }
+        }
+        best
+    }
+}
