@@ -13,6 +13,8 @@ pub(crate) enum Exit {
     Usage = 2,
     /// The machine or another process got in the way.
     Trouble = 3,
+    /// The user asked us to end.
+    Interrupted = 130,
 }
 
 impl From<Exit> for ExitCode {

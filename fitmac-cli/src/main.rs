@@ -1,15 +1,22 @@
 //! `fitmac`: the one front door.
 //!
 //! One file a command in [`cmd`], each with its `Args` and `run`. A command
-//! returns an [`exit::Exit`] or an error; [`exit::status_of`] turns an error into an
+//! returns an [`Exit`] or an error; [`exit::status_of`] turns an error into an
 //! exit status.
 
+mod card;
 mod cmd;
+mod crew;
+mod episode;
 mod exit;
+mod timeline;
 
 use std::process::ExitCode;
 
+use anyhow::{Context, bail};
 use clap::{Parser, Subcommand};
+use exit::Exit;
+use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 
 /// Runtime assurance for robots that run a vision-language-action policy.
 #[derive(Parser)]
@@ -31,25 +38,54 @@ Exit status:
 FIT-MAC is not a safety function: keep the robot's own stops in place."
 )]
 struct Cli {
+    /// End when the process with this id does: it is our supervisor.
+    #[arg(long, hide = true, value_name = "PID")]
+    supervised: Option<i32>,
     #[command(subcommand)]
     command: Command,
 }
 
 #[derive(Subcommand)]
 enum Command {
+    /// A policy fails, then FIT-MAC saves it: four processes, real time.
+    Demo(cmd::demo::Args),
     /// Say what of the real-time set-up is missing and how to get it.
     Doctor(cmd::doctor::Args),
+    /// Run the simulated robot and its world.
+    Sim(cmd::sim::Args),
+    /// Run a surrogate policy.
+    Vla(cmd::vla::Args),
 }
 
 fn main() -> ExitCode {
-    let result = match Cli::parse().command {
-        Command::Doctor(args) => cmd::doctor::run(&args),
-    };
-    match result {
+    match run(Cli::parse()) {
         Ok(exit) => exit.into(),
         Err(error) => {
             eprintln!("fitmac: {error:#}");
             exit::status_of(&error).into()
         }
     }
+}
+
+fn run(cli: Cli) -> anyhow::Result<Exit> {
+    if let Some(supervisor) = cli.supervised {
+        end_with(supervisor)?;
+    }
+    match cli.command {
+        Command::Demo(args) => cmd::demo::run(&args),
+        Command::Doctor(args) => cmd::doctor::run(&args),
+        Command::Sim(args) => cmd::sim::run(&args),
+        Command::Vla(args) => cmd::vla::run(&args),
+    }
+}
+
+/// Has the system ask us to end when our supervisor dies.
+fn end_with(supervisor: i32) -> anyhow::Result<()> {
+    set_parent_process_death_signal(Some(Signal::TERM)).context("following the supervisor")?;
+    // It may have died before we said so.
+    let parent = getppid().map(Pid::as_raw_nonzero).map(i32::from);
+    if parent != Some(supervisor) {
+        bail!("the supervisor (pid {supervisor}) has ended");
+    }
+    Ok(())
 }
