@@ -223,6 +223,12 @@ pub struct Tail {
 }
 
 impl Tail {
+    /// Where the array begins, bytes. The counter stands before it.
+    #[must_use]
+    pub const fn offset(&self) -> usize {
+        self.offset
+    }
+
     /// Bytes of the message in use. A count above the capacity uses all of it.
     #[must_use]
     pub fn used(&self, bytes: &[u8]) -> usize {

@@ -9,11 +9,21 @@
 //! own controller. A stop of ours is a request to it.
 
 pub mod clock;
+pub mod control_loop;
+pub mod counters;
+pub mod cycle;
 pub mod endpoint;
 pub mod envelope;
+pub mod frame;
+pub mod histogram;
 pub mod instance;
 pub mod layout;
 pub mod message;
 pub mod port;
+pub mod realtime;
+pub mod ring;
+pub mod roles;
 pub mod service;
+pub mod signals;
+pub mod telemetry;
 pub mod transport;

@@ -84,7 +84,7 @@ pub struct OperatorRequest {
 }
 
 /// Number of named counters of a [`Status`].
-pub const COUNTER_CAPACITY: usize = 64;
+pub const COUNTER_CAPACITY: usize = 128;
 
 /// The controller's state of health, published ten times a second off the
 /// control thread.
@@ -107,7 +107,7 @@ pub struct Status {
     pub sub_phase: u8,
     /// Counters in use.
     pub counter_count: u32,
-    /// Counters, in the order of the controller's list.
+    /// Counters, in the order of [`crate::counters::names`].
     pub counters: [u64; COUNTER_CAPACITY],
 }
 

@@ -66,18 +66,21 @@ impl<Tr: Transport> ControllerEndpoint<Tr> {
 
     /// Takes at most one waiting message of each service.
     pub fn poll(&mut self) {
-        self.fresh.state = self.state.receive();
-        self.poll_others();
+        self.clear();
+        self.poll_rest();
     }
 
-    /// Takes a waiting state sample, and nothing else; says whether there was one.
+    /// Takes a waiting state sample, and nothing else; says whether there is
+    /// one that no tick has used yet.
     pub fn poll_state(&mut self) -> bool {
-        self.fresh.state |= self.state.receive();
+        self.fresh.state = self.fresh.state || self.state.receive();
         self.fresh.state
     }
 
-    /// Takes at most one waiting message of each service but the state.
-    pub fn poll_others(&mut self) {
+    /// Takes at most one waiting message of each service, but no second state
+    /// sample after [`poll_state`](Self::poll_state) found one.
+    pub fn poll_rest(&mut self) {
+        self.poll_state();
         self.fresh.chunk = self.chunk.receive();
         self.fresh.grounding = self.grounding.receive();
         self.fresh.plan = self.plan.receive();
@@ -89,6 +92,14 @@ impl<Tr: Transport> ControllerEndpoint<Tr> {
     /// Forgets what was polled: the next tick starts with nothing new.
     pub fn clear(&mut self) {
         self.fresh = Fresh::default();
+    }
+
+    /// When the polled state sample was sent, ns; `None` if there is none.
+    #[must_use]
+    pub fn state_sent_ns(&self) -> Option<u64> {
+        self.fresh
+            .state
+            .then_some(self.state.newest().header.stamp_ns)
     }
 
     /// What was polled, as the core takes it.

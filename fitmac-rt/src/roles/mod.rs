@@ -1,0 +1,5 @@
+//! The processes as library functions.
+
+mod controller;
+
+pub use controller::{ControllerError, ControllerReport, ControllerRole, controller};
