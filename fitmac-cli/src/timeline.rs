@@ -49,10 +49,10 @@ pub(crate) fn rows(records: &[TraceRecord], names: &Names) -> Vec<Row> {
             shown.push(record);
         }
     }
-    if let (Some(last), Some(shown_last)) = (records.last(), shown.last()) {
-        if last.query != shown_last.query {
-            shown.push(last);
-        }
+    if let (Some(last), Some(shown_last)) = (records.last(), shown.last())
+        && last.query != shown_last.query
+    {
+        shown.push(last);
     }
     let before = std::iter::once(None).chain(shown.iter().copied().map(Some));
     before

@@ -265,10 +265,10 @@ impl Member {
 /// are none of ours.
 fn forward(lines: impl BufRead, index: usize, sender: &Sender<(usize, Report)>) {
     for line in lines.lines().map_while(Result::ok) {
-        if let Ok(report) = serde_json::from_str(&line) {
-            if sender.send((index, report)).is_err() {
-                return;
-            }
+        if let Ok(report) = serde_json::from_str(&line)
+            && sender.send((index, report)).is_err()
+        {
+            return;
         }
     }
 }
