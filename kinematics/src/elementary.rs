@@ -31,7 +31,7 @@ const PIO2_1: f64 = 1.570_796_326_734_125_6;
 const PIO2_2: f64 = 6.077_100_506_303_966e-11;
 const PIO2_3: f64 = 2.022_266_248_795_950_6e-21;
 /// Largest magnitude that the short argument reduction serves; beyond it `libm` is called.
-const SHORT_REDUCTION_MAX: f64 = 1.0e6;
+pub(crate) const SHORT_REDUCTION_MAX: f64 = 1.0e6;
 
 // Minimax polynomials on [-pi/4, pi/4] (FreeBSD msun, k_sin.c and k_cos.c, public constants).
 const S1: f64 = -1.666_666_666_666_663_2e-1;
@@ -85,17 +85,23 @@ pub fn sincos(x: f64) -> (f64, f64) {
     }
 }
 
+/// Sines and cosines of `N` angles of at most [`SHORT_REDUCTION_MAX`]; without a branch.
+#[inline(always)]
+pub(crate) fn sincos_each_short<const N: usize>(angles: &[f64; N]) -> ([f64; N], [f64; N]) {
+    let mut sines = [0.0; N];
+    let mut cosines = [0.0; N];
+    for ((x, s), c) in angles.iter().zip(&mut sines).zip(&mut cosines) {
+        (*s, *c) = sincos_short(*x);
+    }
+    (sines, cosines)
+}
+
 /// Sines and cosines of `N` angles in radians: the same bits as [`sincos`], in less time.
 #[inline]
 #[must_use]
 pub fn sincos_each<const N: usize>(angles: &[f64; N]) -> ([f64; N], [f64; N]) {
-    let mut sines = [0.0; N];
-    let mut cosines = [0.0; N];
-    let mut largest = 0.0_f64;
-    for ((x, s), c) in angles.iter().zip(&mut sines).zip(&mut cosines) {
-        largest = largest.max(x.abs());
-        (*s, *c) = sincos_short(*x);
-    }
+    let (mut sines, mut cosines) = sincos_each_short(angles);
+    let largest = angles.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     if largest > SHORT_REDUCTION_MAX {
         for ((x, s), c) in angles.iter().zip(&mut sines).zip(&mut cosines) {
             (*s, *c) = sincos(*x);

@@ -5,11 +5,20 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 #![forbid(unsafe_code)]
 
+pub mod arm;
+pub mod chain;
+pub mod diff_ik;
 pub mod elementary;
+pub mod jacobian;
+mod linear;
 pub mod otg;
+pub mod panda;
 pub mod pose;
+pub mod pose_ik;
 pub mod rotation;
 pub mod vector;
 
+pub use arm::Arm;
+pub use chain::Chain;
 pub use pose::Pose;
 pub use rotation::UnitQuaternion;

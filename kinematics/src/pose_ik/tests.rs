@@ -1,0 +1,81 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::panda::{self, LIMITS, Panda};
+use crate::rotation::UnitQuaternion;
+
+fn configuration() -> impl Strategy<Value = [f64; 7]> {
+    prop::array::uniform7(0.02..0.98_f64).prop_map(|share| {
+        core::array::from_fn(|i| LIMITS[i].lower + share[i] * (LIMITS[i].upper - LIMITS[i].lower))
+    })
+}
+
+fn within_limits(q: &[f64; 7]) -> bool {
+    q.iter()
+        .zip(&LIMITS)
+        .all(|(q, l)| (l.lower..=l.upper).contains(q))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(500))]
+
+    #[test]
+    fn what_an_arm_can_reach_is_found(q in configuration()) {
+        let target = Panda.tip(&q).expect("finite").pose();
+        let answer = solve(&Panda, &target, &panda::READY, &Search::default()).expect("usable");
+        prop_assert!(matches!(answer, Answer::Reached(_)), "{answer:?}");
+        let Answer::Reached(found) = answer else { return Ok(()) };
+        prop_assert!(within_limits(&found.q));
+        let tip = Panda.tip(&found.q).expect("finite").pose();
+        prop_assert!(tip.distance(target) <= 1e-6);
+        prop_assert!(tip.orientation.angle_to(target.orientation) <= 1e-6);
+    }
+}
+
+#[test]
+fn the_general_chain_finds_the_same() {
+    let q = [0.4, 0.2, -0.3, -1.8, 0.5, 2.0, 0.1];
+    let target = Panda.tip(&q).expect("finite").pose();
+    let chain = panda::chain().expect("the constants are a chain");
+    let answer = solve(&chain, &target, &panda::READY, &Search::default()).expect("usable");
+    assert!(
+        matches!(answer, Answer::Reached(found) if found.steps < 50),
+        "{answer:?}"
+    );
+}
+
+#[test]
+fn what_is_too_far_is_named() {
+    let far = Pose::from_position([2.0, 0.0, 0.5]);
+    let answer = solve(&Panda, &far, &panda::READY, &Search::default());
+    assert_eq!(answer, Ok(Answer::OutOfReach));
+    // Within the length of the stretched links, but not within the joint ranges.
+    let behind = Pose::new([0.0, 0.0, -0.5], UnitQuaternion::HALF_TURN_X);
+    let search = Search {
+        restarts: 2,
+        ..Search::default()
+    };
+    let Ok(Answer::NotReached(best)) = solve(&Panda, &behind, &panda::READY, &search) else {
+        panic!("no arm reaches through its own base");
+    };
+    assert!(within_limits(&best.q) && best.steps <= 300);
+}
+
+#[test]
+fn bad_requests_are_named() {
+    let nowhere = Pose::from_position([f64::NAN, 0.0, 0.0]);
+    let ask = |target: &Pose, seed: &[f64; 7], search| solve(&Panda, target, seed, &search).err();
+    assert_eq!(
+        ask(&nowhere, &panda::READY, Search::default()),
+        Some(Refusal::Target)
+    );
+    let here = Pose::from_position([0.5, 0.0, 0.5]);
+    let seed = [f64::NAN; 7];
+    let refused = Some(Refusal::Seed(JointOutOfRange { joint: 0 }));
+    assert_eq!(ask(&here, &seed, Search::default()), refused);
+    let search = Search {
+        position_tolerance_m: 0.0,
+        ..Search::default()
+    };
+    assert_eq!(ask(&here, &panda::READY, search), Some(Refusal::Tolerance));
+}
