@@ -16,6 +16,8 @@ pub mod panda;
 pub mod pose;
 pub mod pose_ik;
 pub mod rotation;
+#[cfg(feature = "std")]
+pub mod urdf;
 pub mod vector;
 
 pub use arm::Arm;

@@ -44,6 +44,20 @@ pub fn transpose(m: &Matrix3) -> Matrix3 {
     ]
 }
 
+/// The rotation matrix of roll, pitch and yaw in radians about the fixed axes x, y, z in this
+/// order (the URDF convention).
+#[must_use]
+pub fn matrix_from_rpy(roll_rad: f64, pitch_rad: f64, yaw_rad: f64) -> Matrix3 {
+    let (sr, cr) = sincos(roll_rad);
+    let (sp, cp) = sincos(pitch_rad);
+    let (sy, cy) = sincos(yaw_rad);
+    [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+}
+
 /// A rotation as a unit quaternion. `q` and `-q` are the same rotation and compare as different;
 /// [`UnitQuaternion::angle_to`] compares rotations.
 #[derive(Clone, Copy, Debug, PartialEq)]
