@@ -39,8 +39,26 @@ bits! {
     CRITIC_EXECUTION = 16 "critic_execution",
     /// The released object rests outside its region.
     MISPLACED = 17 "misplaced",
+    /// The held object is lowered away from its destination.
+    WRONG_DESTINATION = 18 "wrong_destination",
+    /// The detector keeps naming another target than the locked one.
+    FLAPPING = 19 "flapping",
 }
+
+/// Evidence that only time gives: it does not count in a young attempt.
+pub const TIME_BASED: u64 = STALL | TIMEOUT | REVERSAL | MOVING_AWAY;
+
+/// Evidence against the binding of the target, whatever the attempt did.
+pub const TARGET: u64 = KAPPA_LOW | LOCK_INCOMPATIBLE | LOCK_JUMPED | NO_LOCK | FLAPPING;
+
+/// Evidence of a wrong object: against the binding until it was looked at
+/// again or the attempt has acted, against the execution afterwards.
+pub const WRONG_OBJECT: u64 = WRONG_TARGET | WRONG_OBJECT_HELD;
+
+/// Evidence against the execution.
+pub const EXECUTION: u64 =
+    TIME_BASED | EMPTY_GRASP | DROPPED | VERIFIER_NEGATIVE | MISPLACED | WRONG_DESTINATION;
 
 /// Strong evidence: opens the gate without a streak.
 pub const STRONG: u64 =
-    WRONG_TARGET | EMPTY_GRASP | DROPPED | VERIFIER_NEGATIVE | WRONG_OBJECT_HELD;
+    WRONG_OBJECT | EMPTY_GRASP | DROPPED | VERIFIER_NEGATIVE | WRONG_DESTINATION | NO_LOCK;

@@ -8,13 +8,33 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-pub mod evidence;
-pub mod message;
-pub mod reason;
-pub mod wire;
-
+pub mod attempt;
+pub mod clock;
 mod controller;
-mod params;
+pub mod decide;
+pub mod diagnosis;
+pub mod evidence;
+pub mod filter;
+pub mod gate;
+pub mod intake;
+pub mod ladder;
+pub mod lock;
+pub mod message;
+pub mod monitor;
+pub mod params;
+pub mod phase;
+pub mod queue;
+pub mod reason;
+pub mod recovery;
+pub mod route;
+pub mod shaping;
+pub mod signals;
+pub mod subtask;
+pub mod trace;
+pub mod tracking;
+pub mod turn;
+pub mod verdicts;
+pub mod wire;
 
 pub use controller::{Controller, State};
 pub use params::{Params, ValidParams};

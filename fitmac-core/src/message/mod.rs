@@ -77,6 +77,8 @@ pub struct Output {
     pub query: Option<PolicyQuery>,
     /// A request to ground the target, to be sent to the agents.
     pub rebind: Option<RebindRequest>,
-    /// What to record.
+    /// The record of a query whose first action starts in this tick.
     pub trace: Option<TraceRecord>,
+    /// The record of an event: a refusal, or a change of mode.
+    pub event: Option<TraceRecord>,
 }
