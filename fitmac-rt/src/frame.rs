@@ -59,6 +59,8 @@ pub mod contents {
     pub const TRACE: u32 = 1 << 8;
     /// Not a message: the command was sent with the flag of the last one.
     pub const LAST: u32 = 1 << 9;
+    /// The record of an event.
+    pub const EVENT: u32 = 1 << 10;
 }
 
 /// Most bytes of a frame.
@@ -72,12 +74,12 @@ pub const FRAME_MAX: usize = size_of::<TickHead>()
     + size_of::<Command>()
     + size_of::<PolicyQuery>()
     + size_of::<RebindRequest>()
-    + size_of::<TraceRecord>();
+    + 2 * size_of::<TraceRecord>();
 
 /// The parts of a frame, in order, ready to be written.
 pub struct Parts<'a> {
     head: TickHead,
-    parts: [&'a [u8]; 10],
+    parts: [&'a [u8]; 11],
 }
 
 impl<'a> Parts<'a> {
@@ -99,6 +101,7 @@ impl<'a> Parts<'a> {
             part(output.query.as_ref(), c::QUERY, contents),
             part(output.rebind.as_ref(), c::REBIND, contents),
             part(output.trace.as_ref(), c::TRACE, contents),
+            part(output.event.as_ref(), c::EVENT, contents),
         ];
         let bytes: usize = parts.iter().map(|p| p.len()).sum();
         head.length = (size_of::<TickHead>() + bytes) as u32;
@@ -190,6 +193,7 @@ impl Tick {
             query: reader.optional(c::QUERY)?,
             rebind: reader.optional(c::REBIND)?,
             trace: reader.optional(c::TRACE)?,
+            event: reader.optional(c::EVENT)?,
         };
         Ok(Self {
             head,
