@@ -281,6 +281,7 @@ mod tests {
                 kappa: f64::INFINITY,
                 ..TraceRecord::zeroed()
             }),
+            event: None,
         };
         (state, chunk, Plan::default(), output)
     }

@@ -131,6 +131,7 @@ mod tests {
             query: None,
             rebind: None,
             trace: None,
+            event: None,
         }
     }
 
