@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde::Deserialize;
 
 use crate::error::SimError;
-use crate::object::ObjectKind;
+use crate::object::{ObjectKind, Shape};
 use crate::pose::Pose;
 
 /// Most objects of a scene: the capacity of a state sample.
@@ -205,9 +205,16 @@ impl Scene {
                 orientation: [qw, qx, qy, qz],
             } = object.pose;
             let name = &object.name;
+            // MuJoCo does not collide sleeping things with each other. What stands on a plate is
+            // judged by contact, so a plate stays awake and keeps awake what touches it.
+            let sleep = if matches!(object.kind.shape, Shape::Plate { .. }) {
+                "never"
+            } else {
+                "auto"
+            };
             let opened = writeln!(
                 bodies,
-                r#"<body name="{name}" pos="{x} {y} {z}" quat="{qw} {qx} {qy} {qz}"><freejoint/>"#
+                r#"<body name="{name}" pos="{x} {y} {z}" quat="{qw} {qx} {qy} {qz}" sleep="{sleep}"><freejoint/>"#
             );
             debug_assert!(opened.is_ok(), "writing to a string cannot fail");
             object.kind.write_geoms(&mut bodies);
@@ -217,7 +224,7 @@ impl Scene {
             r#"<mujoco model="scene">
 <include file="panda.xml"/>
 <option timestep="0.002" integrator="implicitfast" cone="elliptic" impratio="20">
-<flag autoreset="disable"/></option>
+<flag autoreset="disable" sleep="enable"/></option>
 <default>
 <default class="object"><geom contype="2" conaffinity="3" condim="4" friction="1 0.01 0.0002" solref="0.004 1"/></default>
 <default class="world"><geom contype="2" conaffinity="3" condim="3" priority="1" friction="1 0.005 0.0001" solref="0.004 1"/></default>

@@ -52,10 +52,21 @@ pub struct ObjectState {
 }
 
 /// A copy of everything that determines the future of a [`Sim`].
-#[derive(Clone, Debug, PartialEq)]
+///
+/// It holds MuJoCo's whole data, not only its state vector: which objects sleep is not part of the
+/// latter.
+#[derive(Clone, Debug)]
 pub struct Snapshot {
-    state: Box<[f64]>,
+    data: MjData<Arc<MjModel>>,
+    scene: Arc<Scene>,
     osc: Osc,
+}
+
+impl PartialEq for Snapshot {
+    fn eq(&self, other: &Self) -> bool {
+        let future = |s: &Self| (s.data.state(STATE), s.data.tree_asleep().to_vec());
+        self.osc == other.osc && self.scene == other.scene && future(self) == future(other)
+    }
 }
 
 /// Indices into the compiled model.
@@ -70,7 +81,7 @@ struct ObjectIndex {
 #[derive(Debug)]
 pub struct Sim {
     data: MjData<Arc<MjModel>>,
-    scene: Scene,
+    scene: Arc<Scene>,
     objects: Vec<ObjectIndex>,
     /// For each geom: the id of the object that it belongs to, or what else it is.
     owners: Vec<Owner>,
@@ -117,6 +128,7 @@ impl Sim {
         let initial = data.state(STATE);
         let (tcp_m, rotation) = tcp_of(&data, tcp_site);
         let osc = Osc::new(Gains::default(), tcp_m, rotation);
+        let scene = Arc::new(scene);
         Ok(Self {
             data,
             scene,
@@ -235,7 +247,8 @@ impl Sim {
         self.data.qpos_mut()[qpos..qpos + 3].copy_from_slice(&pose.position_m);
         self.data.qpos_mut()[qpos + 3..qpos + 7].copy_from_slice(&pose.orientation);
         self.data.qvel_mut()[dof..dof + 6].fill(0.0);
-        self.data.step1();
+        let state = self.data.state(STATE);
+        self.load(&state);
     }
 
     /// Whether two things touch.
@@ -264,7 +277,8 @@ impl Sim {
     #[must_use]
     pub fn snapshot(&self) -> Snapshot {
         Snapshot {
-            state: self.data.state(STATE),
+            data: self.data.clone(),
+            scene: self.scene.clone(),
             osc: self.osc.clone(),
         }
     }
@@ -274,13 +288,13 @@ impl Sim {
     /// # Errors
     /// [`SimError::Invalid`] if the snapshot is of another scene.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SimError> {
-        if snapshot.state.len() != self.initial.len() {
+        if snapshot.scene != self.scene {
             return Err(SimError::invalid(
                 "snapshot",
                 "it was taken of another scene",
             ));
         }
-        self.load(&snapshot.state);
+        self.data = snapshot.data.clone();
         self.osc = snapshot.osc.clone();
         Ok(())
     }
@@ -290,9 +304,11 @@ impl Sim {
         (&mut self.data, &self.owners)
     }
 
+    /// Goes on from a state with everything awake.
     fn load(&mut self, state: &[f64]) {
+        self.data.reset();
         let loaded = self.data.set_state(state, STATE);
-        debug_assert!(loaded.is_ok(), "the length was checked: {loaded:?}");
+        debug_assert!(loaded.is_ok(), "the state is of this model: {loaded:?}");
         self.data.step1();
     }
 
