@@ -92,6 +92,9 @@ pub struct ObjectKind {
     pub shape: Shape,
     /// Mass, kg.
     pub mass_kg: f64,
+    /// Whether it is bolted down: furniture.
+    #[serde(default)]
+    pub fixed: bool,
     /// Red, green, blue, 0 to 1.
     pub colour: [f32; 3],
 }
@@ -196,6 +199,18 @@ impl ObjectKind {
                 Some(([0.0, 0.0, 0.5 * z], [0.5 * x, 0.5 * y, 0.0]))
             }
             Shape::Cylinder { .. } | Shape::Bottle { .. } => None,
+        }
+    }
+
+    /// Height above the object's own centre at which another one stands on it or in it, m: the
+    /// floor of a basket or a plate, otherwise the top. What nests in a bowl settles from there.
+    #[must_use]
+    pub fn support_m(&self) -> f64 {
+        let [_, _, half] = self.half_extent_m();
+        match self.shape {
+            Shape::Basket { wall_m, .. } => wall_m - half,
+            Shape::Plate { height_m, .. } => height_m / 3.0 - half,
+            _ => half,
         }
     }
 

@@ -85,7 +85,25 @@ impl Scene {
         self.add(name, kind, Pose::upright([xy_m[0], xy_m[1], z], yaw_rad))
     }
 
-    /// Puts an object down on top of another one, upright and centred, and returns its id.
+    /// Puts an object at a height above the working surface, upright, and returns its id: for
+    /// furniture that is bolted down there.
+    ///
+    /// # Errors
+    /// As for [`Scene::put`].
+    pub fn put_at_height(
+        &mut self,
+        name: &str,
+        kind: Arc<ObjectKind>,
+        xy_m: [f64; 2],
+        height_m: f64,
+        yaw_rad: f64,
+    ) -> Result<u16, SimError> {
+        let z = self.arena.surface_m + height_m + kind.half_extent_m()[2] + CLEARANCE_M;
+        self.add(name, kind, Pose::upright([xy_m[0], xy_m[1], z], yaw_rad))
+    }
+
+    /// Puts an object down on or in another one, upright, and returns its id; `offset_m` is from
+    /// the centre of the other one.
     ///
     /// # Errors
     /// As for [`Scene::put`], and [`SimError::Unknown`] if there is no such support.
@@ -94,12 +112,17 @@ impl Scene {
         name: &str,
         kind: Arc<ObjectKind>,
         support: &str,
+        offset_m: [f64; 2],
         yaw_rad: f64,
     ) -> Result<u16, SimError> {
         let below = self.by_name(support)?;
         let [x, y, z] = below.pose.position_m;
-        let z = z + below.kind.half_extent_m()[2] + kind.half_extent_m()[2] + CLEARANCE_M;
-        self.add(name, kind, Pose::upright([x, y, z], yaw_rad))
+        let z = z + below.kind.support_m() + kind.half_extent_m()[2] + CLEARANCE_M;
+        self.add(
+            name,
+            kind,
+            Pose::upright([x + offset_m[0], y + offset_m[1], z], yaw_rad),
+        )
     }
 
     fn add(&mut self, name: &str, kind: Arc<ObjectKind>, pose: Pose) -> Result<u16, SimError> {
@@ -207,14 +230,14 @@ impl Scene {
             let name = &object.name;
             // MuJoCo does not collide sleeping things with each other. What stands on a plate is
             // judged by contact, so a plate stays awake and keeps awake what touches it.
-            let sleep = if matches!(object.kind.shape, Shape::Plate { .. }) {
-                "never"
-            } else {
-                "auto"
+            let freedom = match object.kind.shape {
+                _ if object.kind.fixed => r#">"#,
+                Shape::Plate { .. } => r#" sleep="never"><freejoint/>"#,
+                _ => r#"><freejoint/>"#,
             };
             let opened = writeln!(
                 bodies,
-                r#"<body name="{name}" pos="{x} {y} {z}" quat="{qw} {qx} {qy} {qz}" sleep="{sleep}"><freejoint/>"#
+                r#"<body name="{name}" pos="{x} {y} {z}" quat="{qw} {qx} {qy} {qz}"{freedom}"#
             );
             debug_assert!(opened.is_ok(), "writing to a string cannot fail");
             object.kind.write_geoms(&mut bodies);

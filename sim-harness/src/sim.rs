@@ -73,8 +73,8 @@ impl PartialEq for Snapshot {
 #[derive(Clone, Debug)]
 struct ObjectIndex {
     body: usize,
-    qpos: usize,
-    dof: usize,
+    /// Addresses of the free joint's position and velocity; furniture has none.
+    joint: Option<(usize, usize)>,
 }
 
 /// One scene with the robot in it.
@@ -235,15 +235,14 @@ impl Sim {
         Some(self.read(id, index))
     }
 
-    /// Puts an object somewhere else, at rest: for tests of faults.
+    /// Puts an object somewhere else, at rest: for tests of faults. Furniture stays where it is.
     pub fn teleport(&mut self, id: u16, pose: Pose) {
-        let Some(index) = usize::from(id)
+        let index = usize::from(id)
             .checked_sub(1)
-            .and_then(|i| self.objects.get(i))
-        else {
+            .and_then(|i| self.objects.get(i));
+        let Some((qpos, dof)) = index.and_then(|i| i.joint) else {
             return;
         };
-        let (qpos, dof) = (index.qpos, index.dof);
         self.data.qpos_mut()[qpos..qpos + 3].copy_from_slice(&pose.position_m);
         self.data.qpos_mut()[qpos + 3..qpos + 7].copy_from_slice(&pose.orientation);
         self.data.qvel_mut()[dof..dof + 6].fill(0.0);
@@ -313,14 +312,17 @@ impl Sim {
     }
 
     fn read(&self, id: u16, index: &ObjectIndex) -> ObjectState {
-        let v = &self.data.qvel()[index.dof..index.dof + 3];
+        let velocity_m_s = index.joint.map_or([0.0; 3], |(_, dof)| {
+            let v = &self.data.qvel()[dof..dof + 3];
+            [v[0], v[1], v[2]]
+        });
         ObjectState {
             id,
             pose: Pose {
                 position_m: self.data.xpos()[index.body],
                 orientation: self.data.xquat()[index.body],
             },
-            velocity_m_s: [v[0], v[1], v[2]],
+            velocity_m_s,
         }
     }
 
@@ -403,14 +405,15 @@ fn required(data: &MjData<Arc<MjModel>>, of: MjtObjBase, name: &str) -> Result<u
 fn index_object(data: &MjData<Arc<MjModel>>, o: &PlacedObject) -> Result<ObjectIndex, SimError> {
     let body = required(data, MjtObjBase::mjOBJ_BODY, &o.name)?;
     let model = data.model();
-    let joint = model.body_jntadr()[body];
-    let joint = usize::try_from(joint)
-        .map_err(|_| SimError::Compile(format!("object `{}` has no free joint", o.name)))?;
-    Ok(ObjectIndex {
-        body,
-        qpos: model.jnt_qposadr()[joint] as usize,
-        dof: model.jnt_dofadr()[joint] as usize,
-    })
+    let joint = usize::try_from(model.body_jntadr()[body])
+        .ok()
+        .map(|joint| {
+            (
+                model.jnt_qposadr()[joint] as usize,
+                model.jnt_dofadr()[joint] as usize,
+            )
+        });
+    Ok(ObjectIndex { body, joint })
 }
 
 fn owners(data: &MjData<Arc<MjModel>>, objects: &[ObjectIndex]) -> Result<Vec<Owner>, SimError> {

@@ -8,21 +8,30 @@ use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
 
 use crate::error::SimError;
-use crate::object::Library;
+use crate::object::{Library, ObjectKind};
 use crate::predicate::Goal;
 use crate::scene::{Arena, Scene};
 
-/// The embedded suite that mirrors LIBERO-Object.
-const OBJECT: &str = include_str!("../assets/suites/object.toml");
+/// The embedded suites by name.
+const EMBEDDED: [(&str, &str); 2] = [
+    ("object", include_str!("../assets/suites/object.toml")),
+    ("spatial", include_str!("../assets/suites/spatial.toml")),
+];
 
-/// A box on the working surface in which an object's centre starts.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+/// A box in which an object's centre starts.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
-    /// Centre, base frame, m.
+    /// Centre, m: in the base frame, or from the centre of the object in `on`.
     pub centre_m: [f64; 2],
     /// Half extent, m.
     pub half_m: [f64; 2],
+    /// Height above the working surface, m: for furniture.
+    #[serde(default)]
+    pub height_m: f64,
+    /// The object on or in which it stands, if that is not the working surface.
+    #[serde(default)]
+    pub on: Option<String>,
 }
 
 /// How the object stands to the destination in the end.
@@ -50,7 +59,42 @@ pub struct TaskObject {
     pub yaw_rad: f64,
 }
 
-/// A task: what stands where, what is asked.
+/// Another look of the target: its name stays.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Variant {
+    /// Red, green, blue, 0 to 1.
+    pub colour: [f32; 3],
+    /// Size, as a multiple of the usual one.
+    pub scale: f64,
+}
+
+/// Where the Pos perturbation moves something.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Displacement {
+    /// What moves.
+    #[serde(rename = "move")]
+    pub object: String,
+    /// What it changes places with.
+    #[serde(default)]
+    pub with: Option<String>,
+    /// What it is put on top of instead.
+    #[serde(default)]
+    pub onto: Option<String>,
+}
+
+/// What the Task perturbation asks for instead.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OtherTarget {
+    /// The object that is meant then.
+    pub object: String,
+    /// What the robot is told then.
+    pub instruction: String,
+}
+
+/// A task: what stands where, what is asked, and how it can be perturbed.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Task {
@@ -58,17 +102,21 @@ pub struct Task {
     pub name: String,
     /// What the robot is told.
     pub instruction: String,
+    /// The same in other words.
+    pub paraphrases: Vec<String>,
     /// The object that the instruction means.
     pub target: String,
     /// How it stands to the destination in the end.
     pub relation: Relation,
     /// Where it goes.
     pub destination: String,
-    /// The object that changes places with another one when positions are perturbed.
-    pub swap: String,
-    /// The object that a perturbed task names instead.
-    pub other: String,
-    /// The objects.
+    /// Another look of the target.
+    pub variant: Variant,
+    /// What moves when positions are perturbed.
+    pub pos: Displacement,
+    /// What is asked for when the task is perturbed.
+    pub other: OtherTarget,
+    /// The objects, supports before what stands on them.
     pub objects: Vec<TaskObject>,
 }
 
@@ -90,16 +138,27 @@ pub struct Suite {
     pub tasks: Vec<Task>,
 }
 
+/// What differs from the suite's own scene when one is built.
+#[derive(Clone, Debug, Default)]
+pub struct Alteration {
+    /// Other surroundings.
+    pub arena: Option<Arena>,
+    /// Another look of the target.
+    pub variant: Option<Variant>,
+}
+
 impl Suite {
-    /// An embedded suite by name: `object`.
+    /// An embedded suite by name: `object` or `spatial`.
     ///
     /// # Errors
     /// [`SimError::Unknown`] for another name.
     pub fn embedded(name: &str) -> Result<Self, SimError> {
-        match name {
-            "object" => Self::parse("suites/object.toml", OBJECT),
-            _ => Err(SimError::unknown("suite", name, ["object"])),
-        }
+        let names = EMBEDDED.map(|(known, _)| known);
+        let (known, text) = EMBEDDED
+            .iter()
+            .find(|(known, _)| *known == name)
+            .ok_or_else(|| SimError::unknown("suite", name, names))?;
+        Self::parse(&format!("suites/{known}.toml"), text)
     }
 
     /// Reads a suite and checks that all names in it resolve. `file` is the name that errors give.
@@ -111,9 +170,14 @@ impl Suite {
             file: file.to_owned(),
             message: e.to_string(),
         })?;
-        let library = Library::embedded()?;
+        if suite.tasks.is_empty() {
+            return Err(SimError::invalid(
+                format!("suite `{}`", suite.name),
+                "it has no task",
+            ));
+        }
         for task in &suite.tasks {
-            suite.check(task, &library)?;
+            suite.check(task)?;
         }
         Ok(suite)
     }
@@ -135,7 +199,7 @@ impl Suite {
     /// # Errors
     /// If a name does not resolve, which [`Suite::parse`] rules out.
     pub fn nominal_scene(&self, task: &Task) -> Result<Scene, SimError> {
-        self.scene_with(task, |region| region.centre_m)
+        self.build(task, &Alteration::default(), |region| region.centre_m)
     }
 
     /// The scene of a task with starts drawn from the regions by `seed`.
@@ -143,25 +207,59 @@ impl Suite {
     /// # Errors
     /// If a name does not resolve, which [`Suite::parse`] rules out.
     pub fn sample_scene(&self, task: &Task, seed: u64) -> Result<Scene, SimError> {
+        self.sample_altered(task, seed, &Alteration::default())
+    }
+
+    /// The same starts as [`Suite::sample_scene`], in an altered scene.
+    ///
+    /// # Errors
+    /// As for [`Suite::sample_scene`], and [`SimError::Invalid`] for an impossible alteration.
+    pub fn sample_altered(
+        &self,
+        task: &Task,
+        seed: u64,
+        alteration: &Alteration,
+    ) -> Result<Scene, SimError> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        self.scene_with(task, |region| {
+        self.build(task, alteration, |region| {
             std::array::from_fn(|i| {
                 region.centre_m[i] + region.half_m[i] * rng.random_range(-1.0..=1.0)
             })
         })
     }
 
-    fn scene_with(
+    fn build(
         &self,
         task: &Task,
+        alteration: &Alteration,
         mut place: impl FnMut(&Region) -> [f64; 2],
     ) -> Result<Scene, SimError> {
         let library = Library::embedded()?;
-        let mut scene = Scene::new(self.arena.clone());
+        let arena = alteration
+            .arena
+            .clone()
+            .unwrap_or_else(|| self.arena.clone());
+        let mut scene = Scene::new(arena);
         for object in &task.objects {
-            let kind = Arc::new(library.get(&object.kind)?.clone());
-            let xy_m = place(self.region(&object.region)?);
-            scene.put(&object.name, kind, xy_m, object.yaw_rad)?;
+            let mut kind = library.get(&object.kind)?.clone();
+            if let Some(variant) = &alteration.variant
+                && object.name == task.target
+            {
+                kind = altered(&kind, variant)?;
+            }
+            let kind = Arc::new(kind);
+            let region = self.region(&object.region)?;
+            let xy_m = place(region);
+            match &region.on {
+                Some(support) => scene.put_on(&object.name, kind, support, xy_m, object.yaw_rad)?,
+                None => scene.put_at_height(
+                    &object.name,
+                    kind,
+                    xy_m,
+                    region.height_m,
+                    object.yaw_rad,
+                )?,
+            };
         }
         Ok(scene)
     }
@@ -173,29 +271,59 @@ impl Suite {
             .ok_or_else(|| SimError::unknown("region", name, known))
     }
 
-    fn check(&self, task: &Task, library: &Library) -> Result<(), SimError> {
+    fn check(&self, task: &Task) -> Result<(), SimError> {
         let scene = self.nominal_scene(task)?;
-        for name in [&task.target, &task.destination, &task.swap, &task.other] {
+        let named = [
+            &task.target,
+            &task.destination,
+            &task.pos.object,
+            &task.other.object,
+        ];
+        let partners = task.pos.with.iter().chain(&task.pos.onto);
+        for name in named.into_iter().chain(partners) {
             scene.by_name(name)?;
         }
-        for object in &task.objects {
-            library.get(&object.kind)?;
+        let wrong = |problem: &str| SimError::invalid(format!("task `{}`", task.name), problem);
+        if task.target == task.other.object || task.target == task.destination {
+            return Err(wrong(
+                "target, other and destination must be different objects",
+            ));
         }
-        if task.target == task.other || task.target == task.destination {
-            let problem = "target, other and destination must be different objects";
-            return Err(SimError::invalid(format!("task `{}`", task.name), problem));
+        if task.pos.with.is_some() == task.pos.onto.is_some() {
+            return Err(wrong("pos needs either `with` or `onto`"));
+        }
+        if task.paraphrases.is_empty() {
+            return Err(wrong("it has no paraphrase"));
+        }
+        if !(0.2..=3.0).contains(&task.variant.scale) {
+            return Err(wrong("the variant's scale must lie in 0.2 to 3"));
         }
         Ok(())
     }
 }
 
+/// The kind with another look.
+fn altered(kind: &ObjectKind, variant: &Variant) -> Result<ObjectKind, SimError> {
+    if !(0.2..=3.0).contains(&variant.scale) {
+        let problem = format!("a scale of {} is outside 0.2 to 3", variant.scale);
+        return Err(SimError::invalid(
+            format!("object `{}`", kind.label),
+            problem,
+        ));
+    }
+    Ok(ObjectKind {
+        colour: variant.colour,
+        ..kind.scaled(variant.scale)
+    })
+}
+
 impl Task {
-    /// What the task asks for, in a scene that was made from it.
+    /// What the task asks for, in a scene that was made from it; `object` is what is to be moved.
     ///
     /// # Errors
-    /// [`SimError::Unknown`] if the scene lacks the target or the destination.
-    pub fn goal(&self, scene: &Scene) -> Result<Goal, SimError> {
-        let object = scene.by_name(&self.target)?.id;
+    /// [`SimError::Unknown`] if the scene lacks the object or the destination.
+    pub fn goal_for(&self, object: &str, scene: &Scene) -> Result<Goal, SimError> {
+        let object = scene.by_name(object)?.id;
         let destination = scene.by_name(&self.destination)?.id;
         Ok(match self.relation {
             Relation::In => Goal::In {
@@ -207,5 +335,13 @@ impl Task {
                 support: destination,
             },
         })
+    }
+
+    /// What the unperturbed task asks for.
+    ///
+    /// # Errors
+    /// As for [`Task::goal_for`].
+    pub fn goal(&self, scene: &Scene) -> Result<Goal, SimError> {
+        self.goal_for(&self.target, scene)
     }
 }

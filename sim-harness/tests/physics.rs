@@ -217,7 +217,9 @@ fn play(suite: &Suite, task: &str, seed: u64, swap: bool) -> (bool, Sim, Goal) {
     let task = suite.task(task).unwrap();
     let mut scene = suite.sample_scene(task, seed).unwrap();
     if swap {
-        scene.swap_places(&task.target, &task.swap).unwrap();
+        scene
+            .swap_places(&task.target, task.pos.with.as_ref().unwrap())
+            .unwrap();
     }
     let goal = task.goal(&scene).unwrap();
     let mut sim = Sim::new(scene).unwrap();
@@ -254,7 +256,10 @@ fn the_surrogate_does_its_task_where_it_was_trained_and_takes_the_distractor_els
         let start = suite.sample_scene(task, seed).unwrap();
         let (done, sim, goal) = play(&suite, "alphabet_soup", seed, true);
         assert!(!done, "seed {seed}: the target stands elsewhere");
-        let distractor = sim.scene().by_name(&task.swap).unwrap();
+        let distractor = sim
+            .scene()
+            .by_name(task.pos.with.as_ref().unwrap())
+            .unwrap();
         let basket = sim.scene().by_name("basket").unwrap().id;
         let taken = Goal::In {
             object: distractor.id,
@@ -265,7 +270,11 @@ fn the_surrogate_does_its_task_where_it_was_trained_and_takes_the_distractor_els
             "seed {seed}: it puts the distractor into the basket"
         );
         let left = sim.object(goal.object()).unwrap().pose.position_m;
-        let stood = start.by_name(&task.swap).unwrap().pose.position_m;
+        let stood = start
+            .by_name(task.pos.with.as_ref().unwrap())
+            .unwrap()
+            .pose
+            .position_m;
         assert!(distance_m([left[0], left[1], 0.0], [stood[0], stood[1], 0.0]) < 0.02);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::backbone::{Observation, SeenObject};
 use crate::error::SimError;
-use crate::grasp::grasp_offset_m;
+use crate::grasp::{Side, freer_side, grasp_offset_m};
 use crate::pose::distance_xy_m;
 use crate::scene::PlacedObject;
 use crate::suite::{Relation, Suite, Task};
@@ -11,8 +11,15 @@ use crate::suite::{Relation, Suite, Task};
 const MISPLACED_M: f64 = 0.10;
 /// Height of the carried object's bottom above the destination's top, m.
 const CARRY_CLEARANCE_M: f64 = 0.035;
+/// Height of the carried object's bottom above the working surface, m: over what stands around.
+const CARRY_ABOVE_SURFACE_M: f64 = 0.09;
+/// How far the grasped object is raised at least, m.
+const LIFT_M: f64 = 0.08;
 /// Height of the released object's bottom above a surface, m.
 const RELEASE_CLEARANCE_M: f64 = 0.006;
+/// A bowl that is held by its rim tilts and swings under the hand: it is set down with its centre
+/// at this share of the distance at which it was grasped.
+const HELD_SHARE: f64 = 0.6;
 /// Height of the hover point above the target's top, m.
 const HOVER_M: f64 = 0.10;
 
@@ -52,7 +59,7 @@ impl Demonstration {
         let scene = suite.nominal_scene(task)?;
         let target = scene.by_name(&task.target)?;
         let destination = scene.by_name(&task.destination)?;
-        let offset = grasp_offset_m(&target.kind);
+        let offset = grasp_offset_m(&target.kind, freer_side(&scene, target));
         let grasp_m: [f64; 3] = std::array::from_fn(|i| target.pose.position_m[i] + offset[i]);
         let above = top_m(destination) + carried_depth_m(target);
         let release_z = match task.relation {
@@ -78,9 +85,15 @@ impl Demonstration {
             target_m: target.pose.position_m,
             grasp_m,
             hover_z_m: top_m(target) + HOVER_M,
-            carry_z_m: above + CARRY_CLEARANCE_M,
+            carry_z_m: (above + CARRY_CLEARANCE_M)
+                .max(scene.arena.surface_m + CARRY_ABOVE_SURFACE_M + carried_depth_m(target))
+                .max(grasp_m[2] + LIFT_M),
             destination_m: destination.pose.position_m,
-            release_m: [dx + offset[0], dy + offset[1], release_z],
+            release_m: [
+                dx + HELD_SHARE * offset[0],
+                dy + HELD_SHARE * offset[1],
+                release_z,
+            ],
         })
     }
 
@@ -106,7 +119,7 @@ fn top_m(object: &PlacedObject) -> f64 {
 
 /// From the tool centre point down to the bottom of the held object, m.
 fn carried_depth_m(object: &PlacedObject) -> f64 {
-    grasp_offset_m(&object.kind)[2] + object.kind.half_extent_m()[2]
+    grasp_offset_m(&object.kind, Side::Left)[2] + object.kind.half_extent_m()[2]
 }
 
 /// All that was learnt.

@@ -5,10 +5,13 @@ use nalgebra::Vector3;
 use crate::action::{POLICY_STEP_S, POSITION_SCALE_M};
 use crate::osc::Gains;
 
-/// The tool centre point as a critically damped unit mass that is pulled to the goal.
-///
-/// Under operational-space control with damping ratio 1 this is what the arm does as long as no
-/// joint or torque limit is met and nothing is touched.
+/// Share of a critically damped unit mass's motion that the arm really makes: translation and
+/// rotation are controlled as if decoupled, so holding the orientation drags on the translation.
+/// Measured on this arm between 0.6 (towards and away from the base) and 0.95 (sideways).
+const DRAG: f64 = 0.8;
+
+/// The tool centre point as a critically damped unit mass that is pulled to the goal, dragging a
+/// little.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointMass {
     /// Position, base frame, m.
@@ -27,9 +30,10 @@ impl PointMass {
         let slope = self.velocity_m_s + rate * offset;
         let decay = libm::exp(-rate * POLICY_STEP_S);
         let now = offset + slope * POLICY_STEP_S;
+        let ideal = goal + now * decay;
         Self {
-            position_m: goal + now * decay,
-            velocity_m_s: (slope - rate * now) * decay,
+            position_m: self.position_m + DRAG * (ideal - self.position_m),
+            velocity_m_s: DRAG * (slope - rate * now) * decay,
         }
     }
 
@@ -57,7 +61,7 @@ mod tests {
             position_m: Vector3::zeros(),
             velocity_m_s: Vector3::zeros(),
         };
-        for _ in 0..60 {
+        for _ in 0..120 {
             mass = mass.after(mass.towards(goal, 1.0));
             assert!(mass.position_m.norm() <= goal.norm() + 1e-9);
         }

@@ -27,6 +27,8 @@ const ARRIVED_M: f64 = 0.008;
 const PASSED_M: f64 = 0.02;
 /// Policy steps for which the gripper is commanded shut before the lift.
 const CLOSE_STEPS: u32 = 9;
+/// Policy steps for which the object is held still above its place.
+const POISE_STEPS: u32 = 4;
 /// Policy steps for which the gripper is commanded open before the retreat.
 const OPEN_STEPS: u32 = 6;
 /// How far the tool rises after the release, m.
@@ -81,6 +83,7 @@ enum Stage {
     Lift,
     Transport,
     Lower,
+    Poise { steps: u32 },
     Open { steps: u32 },
     Retreat,
     Done,
@@ -236,7 +239,7 @@ impl Stage {
             // Straight up from wherever the grasp was.
             Self::Lift => (Vector3::new(here.x, here.y, w.carry.z), 1.0),
             Self::Transport => (w.carry, 1.0),
-            Self::Lower => (w.release, 1.0),
+            Self::Lower | Self::Poise { .. } => (w.release, 1.0),
             Self::Open { .. } => (w.release, -1.0),
             Self::Retreat => (w.retreat, -1.0),
             Self::Done => (here, -1.0),
@@ -257,7 +260,9 @@ fn advance(stage: Stage, mass: &PointMass, w: &Waypoints, close_wait: u32) -> St
         Stage::Close { steps } => Stage::Close { steps: steps + 1 },
         Stage::Lift if w.carry.z - mass.position_m.z < PASSED_M => Stage::Transport,
         Stage::Transport if away_xy(w.carry) < ARRIVED_M => Stage::Lower,
-        Stage::Lower if away(w.release) < ARRIVED_M => Stage::Open { steps: 0 },
+        Stage::Lower if away(w.release) < ARRIVED_M => Stage::Poise { steps: 0 },
+        Stage::Poise { steps } if steps >= POISE_STEPS => Stage::Open { steps: 0 },
+        Stage::Poise { steps } => Stage::Poise { steps: steps + 1 },
         Stage::Open { steps } if steps >= OPEN_STEPS => Stage::Retreat,
         Stage::Open { steps } => Stage::Open { steps: steps + 1 },
         Stage::Retreat if away(w.retreat) < PASSED_M => Stage::Done,
@@ -287,14 +292,16 @@ fn resynchronise(episode: &Episode, observation: &Observation, w: &Waypoints) ->
             Stage::Approach
         }
         // Somebody opened it on the way.
-        Stage::Lift | Stage::Transport | Stage::Lower if !closed => {
+        Stage::Lift | Stage::Transport | Stage::Lower | Stage::Poise { .. } if !closed => {
             if near(w.release) {
                 Stage::Retreat
             } else {
                 Stage::Approach
             }
         }
-        Stage::Lower | Stage::Open { .. } if !near(w.release) => Stage::Transport,
+        Stage::Lower | Stage::Poise { .. } | Stage::Open { .. } if !near(w.release) => {
+            Stage::Transport
+        }
         as_planned => as_planned,
     }
 }
