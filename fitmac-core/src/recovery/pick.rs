@@ -163,15 +163,16 @@ impl Pick {
         let top = target.position_m[2] + target.half_height_m;
         let hover_z = top + p.hover_m;
         let far = scene.horizontal_to(goal) > scene.params.phase.approach_distance_m;
+        // A sideways move below this height would sweep things away.
         let clear_z = path_top(scene.sample, scene.signals.ee_m, goal, &[target.id])
-            .map_or(hover_z, |h| hover_z.max(h + p.clearance_m));
+            .map_or(f64::NEG_INFINITY, |h| h + p.clearance_m);
+        let travel_z = hover_z.max(clear_z);
         let rotation_rad = levelling(scene.params, scene.sample, target, turning > 0);
         let turns = rotation_rad != [0.0; 3] && turning < TURN_QUERIES;
-        let waypoint_m = if far && z < clear_z - p.hover_z_m {
-            // Rise first: a sideways move at this height would sweep things away.
-            [x, y, clear_z]
+        let waypoint_m = if far && z < clear_z - p.grasp_z_m {
+            [x, y, travel_z]
         } else if far {
-            [gx, gy, clear_z]
+            [gx, gy, travel_z]
         } else {
             [gx, gy, hover_z]
         };
