@@ -5,4 +5,9 @@
 //! learned detector may be added and are never trusted further than the rules
 //! allow.
 
+pub mod canvas;
+pub mod grounder;
 pub mod planner;
+pub mod scene;
+pub mod synthetic;
+pub mod track;
