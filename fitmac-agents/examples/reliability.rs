@@ -21,7 +21,9 @@ fn main() -> anyhow::Result<()> {
     let mut arguments = std::env::args().skip(1);
     match arguments.next().as_deref() {
         Some("fit") => {
-            fit(&outcomes(1000..1040));
+            let mut scenes = outcomes(1000..1020, &DetectorModel::default());
+            scenes.extend(outcomes(1020..1040, &DetectorModel::harsh()));
+            fit(&scenes);
             Ok(())
         }
         Some("report") => report(arguments.next().as_deref()),
@@ -29,18 +31,17 @@ fn main() -> anyhow::Result<()> {
     }
 }
 
-fn outcomes(seeds: impl IntoIterator<Item = u64>) -> Vec<Outcome> {
-    let model = DetectorModel::default();
+fn outcomes(seeds: impl IntoIterator<Item = u64>, model: &DetectorModel) -> Vec<Outcome> {
     seeds
         .into_iter()
         .flat_map(|seed| (0..SCENES_PER_SEED).map(move |number| (seed, number)))
-        .map(|(seed, number)| synthetic::run(&synthetic::case(seed, number, &model)).1)
+        .map(|(seed, number)| synthetic::run(&synthetic::case(seed, number, model)).1)
         .collect()
 }
 
 /// Newton's method on the logistic likelihood, with a small ridge.
 fn fit(outcomes: &[Outcome]) {
-    const N: usize = 5;
+    const N: usize = 6;
     let data: Vec<([f64; N], f64)> = outcomes
         .iter()
         .filter_map(|o| Some((kappa::terms(&o.evidence?), f64::from(u8::from(o.right)))))
@@ -50,7 +51,11 @@ fn fit(outcomes: &[Outcome]) {
         let mut gradient = [0.0; N];
         let mut hessian = [[0.0; N]; N];
         for (terms, right) in &data {
-            let sum: f64 = terms.iter().zip(weights).map(|(term, weight)| term * weight).sum();
+            let sum: f64 = terms
+                .iter()
+                .zip(weights)
+                .map(|(term, weight)| term * weight)
+                .sum();
             let p = 1.0 / (1.0 + (-sum).exp());
             for row in 0..N {
                 gradient[row] += (right - p) * terms[row];
@@ -68,7 +73,10 @@ fn fit(outcomes: &[Outcome]) {
             *weight += step;
         }
     }
-    println!("{} scenes; constant, margin, support, detection, margin x support:", data.len());
+    println!(
+        "{} scenes; constant, margin, support, detection, margin x support, margin x detection:",
+        data.len()
+    );
     println!("{weights:.3?}");
 }
 
@@ -76,15 +84,20 @@ fn fit(outcomes: &[Outcome]) {
 fn solve<const N: usize>(mut matrix: [[f64; N]; N], mut right: [f64; N]) -> [f64; N] {
     for column in 0..N {
         let pivot = (column..N)
-            .max_by(|a, b| matrix[*a][column].abs().total_cmp(&matrix[*b][column].abs()))
+            .max_by(|a, b| {
+                matrix[*a][column]
+                    .abs()
+                    .total_cmp(&matrix[*b][column].abs())
+            })
             .unwrap_or(column);
         matrix.swap(column, pivot);
         right.swap(column, pivot);
         for row in 0..N {
             if row != column {
                 let factor = matrix[row][column] / matrix[column][column];
-                for k in column..N {
-                    matrix[row][k] -= factor * matrix[column][k];
+                let pivot_row = matrix[column];
+                for (value, pivot) in matrix[row].iter_mut().zip(pivot_row).skip(column) {
+                    *value -= factor * pivot;
                 }
                 right[row] -= factor * right[column];
             }
@@ -94,9 +107,21 @@ fn solve<const N: usize>(mut matrix: [[f64; N]; N], mut right: [f64; N]) -> [f64
 }
 
 fn report(png: Option<&str>) -> anyhow::Result<()> {
-    let outcomes = outcomes(REPORT_SEEDS);
+    println!("== a detector of ordinary noise");
+    let bins = table(&outcomes(REPORT_SEEDS, &DetectorModel::default()));
+    println!("\n== a detector on a bad day");
+    table(&outcomes(REPORT_SEEDS, &DetectorModel::harsh()));
+    if let Some(path) = png {
+        let image = diagram(&bins).png()?;
+        std::fs::write(path, image).with_context(|| format!("{path} can't be written"))?;
+    }
+    Ok(())
+}
+
+/// Prints rates by kind and the reliability of kappa.
+fn table(outcomes: &[Outcome]) -> [Bin; 10] {
     let mut kinds: BTreeMap<&str, [u32; 5]> = BTreeMap::new();
-    for outcome in &outcomes {
+    for outcome in outcomes {
         for kind in [outcome.kind, "all"] {
             let counts = kinds.entry(kind).or_default();
             let unsure = outcome.verdict != Verdict::Resolved;
@@ -110,7 +135,10 @@ fn report(png: Option<&str>) -> anyhow::Result<()> {
             }
         }
     }
-    println!("{:<18} clear: scenes, right, called ambiguous; ambiguous: scenes, reported", "kind");
+    println!(
+        "{:<18} clear: scenes, right, called ambiguous; ambiguous: scenes, reported",
+        "kind"
+    );
     for (kind, [clear, right, called, ambiguous, reported]) in kinds {
         println!(
             "{kind:<18} {clear:5} {:6.2}% {:6.2}%   {ambiguous:5} {:6.2}%",
@@ -119,7 +147,7 @@ fn report(png: Option<&str>) -> anyhow::Result<()> {
             percent(reported, ambiguous)
         );
     }
-    let bins = reliability(&outcomes);
+    let bins = reliability(outcomes);
     println!("\nkappa bin, locks, mean kappa, right");
     let mut error = 0.0;
     for (index, bin) in bins.iter().enumerate().filter(|(_, bin)| bin.locks > 0) {
@@ -136,15 +164,15 @@ fn report(png: Option<&str>) -> anyhow::Result<()> {
     }
     let locks: u32 = bins.iter().map(|bin| bin.locks).sum();
     println!("expected calibration error {:.4}", error / f64::from(locks));
-    if let Some(path) = png {
-        let image = diagram(&bins).png()?;
-        std::fs::write(path, image).with_context(|| format!("{path} can't be written"))?;
-    }
-    Ok(())
+    bins
 }
 
 fn percent(part: u32, whole: u32) -> f64 {
-    if whole == 0 { f64::NAN } else { 100.0 * f64::from(part) / f64::from(whole) }
+    if whole == 0 {
+        f64::NAN
+    } else {
+        100.0 * f64::from(part) / f64::from(whole)
+    }
 }
 
 #[derive(Clone, Copy, Default)]
@@ -178,19 +206,39 @@ fn diagram(bins: &[Bin; 10]) -> Canvas {
         let left = index as f64 / 10.0;
         let (top, bottom) = (y(share), y(0.0));
         let height = (bottom - top).max(1) as u32;
-        canvas.fill([x(left) + 2, top], [(plot / 10 - 4) as u32, height], Colour::BLUE);
+        canvas.fill(
+            [x(left) + 2, top],
+            [(plot / 10 - 4) as u32, height],
+            Colour::BLUE,
+        );
         let mean = bin.kappa / f64::from(bin.locks);
         canvas.fill([x(mean) - 3, y(share) - 3], [7, 7], Colour::RED);
-        canvas.text(&bin.locks.to_string(), [x(left) + 4, top - 12], Colour::BLACK);
+        canvas.text(
+            &bin.locks.to_string(),
+            [x(left) + 4, top - 12],
+            Colour::BLACK,
+        );
     }
     canvas.line([x(0.0), y(0.0)], [x(1.0), y(0.0)], Colour::BLACK);
     canvas.line([x(0.0), y(0.0)], [x(0.0), y(1.0)], Colour::BLACK);
     for tick in 0..=5 {
         let value = f64::from(tick) / 5.0;
-        canvas.text(&format!("{value:.1}"), [x(value) - 9, y(0.0) + 8], Colour::BLACK);
-        canvas.text(&format!("{value:.1}"), [x(0.0) - 30, y(value) - 5], Colour::BLACK);
+        canvas.text(
+            &format!("{value:.1}"),
+            [x(value) - 9, y(0.0) + 8],
+            Colour::BLACK,
+        );
+        canvas.text(
+            &format!("{value:.1}"),
+            [x(0.0) - 30, y(value) - 5],
+            Colour::BLACK,
+        );
     }
     canvas.text("reported kappa", [x(0.5) - 42, y(0.0) + 28], Colour::BLACK);
-    canvas.text("share of right locks (red: at the bin's mean kappa)", [x(0.0), 20], Colour::BLACK);
+    canvas.text(
+        "share of right locks (red: at the bin's mean kappa)",
+        [x(0.0), 20],
+        Colour::BLACK,
+    );
     canvas
 }

@@ -58,7 +58,11 @@ impl Canvas {
     #[must_use]
     pub fn filled(width_px: u32, height_px: u32, Colour(colour): Colour) -> Self {
         let count = width_px as usize * height_px as usize;
-        Self { width_px, height_px, pixels: colour.repeat(count) }
+        Self {
+            width_px,
+            height_px,
+            pixels: colour.repeat(count),
+        }
     }
 
     /// An image from its RGB bytes.
@@ -68,9 +72,18 @@ impl Canvas {
     pub fn from_rgb(width_px: u32, height_px: u32, pixels: Vec<u8>) -> Result<Self, SizeMismatch> {
         let expected = width_px as usize * height_px as usize * 3;
         if pixels.len() == expected {
-            Ok(Self { width_px, height_px, pixels })
+            Ok(Self {
+                width_px,
+                height_px,
+                pixels,
+            })
         } else {
-            Err(SizeMismatch { width_px, height_px, expected, given: pixels.len() })
+            Err(SizeMismatch {
+                width_px,
+                height_px,
+                expected,
+                given: pixels.len(),
+            })
         }
     }
 
@@ -111,8 +124,7 @@ impl Canvas {
     /// `at_px`.
     pub fn text(&mut self, text: &str, at_px: [i32; 2], colour: Colour) {
         let style = MonoTextStyle::new(&FONT_6X10, Rgb888::from(colour));
-        let Ok(_) =
-            Text::with_baseline(text, Point::from(at_px), style, Baseline::Top).draw(self);
+        let Ok(_) = Text::with_baseline(text, Point::from(at_px), style, Baseline::Top).draw(self);
     }
 
     /// White text in 9 x 15 px letters on a plate of the given colour.

@@ -259,3 +259,57 @@ fn bad_scenes_name_their_field() {
         assert!(error.contains(expected), "{error}");
     }
 }
+
+/// The figure that the documentation quotes, on the seeds of the report.
+#[test]
+fn two_thousand_generated_scenes() {
+    use crate::synthetic::{DetectorModel, case, run};
+    let model = DetectorModel::default();
+    let (mut clear, mut right, mut ambiguous, mut reported) = (0_u32, 0_u32, 0_u32, 0_u32);
+    let (mut sure, mut sure_right) = (0_u32, 0_u32);
+    for seed in [7, 11, 13, 17, 23] {
+        for number in 0..400 {
+            let (_, outcome) = run(&case(seed, number, &model));
+            if outcome.clear {
+                clear += 1;
+                right += u32::from(outcome.right);
+            } else {
+                ambiguous += 1;
+                reported += u32::from(outcome.verdict != Verdict::Resolved);
+            }
+            if outcome.kappa >= 0.9 {
+                sure += 1;
+                sure_right += u32::from(outcome.right);
+            }
+        }
+    }
+    println!(
+        "{right} of {clear} right, {reported} of {ambiguous} reported, {sure_right} of {sure}"
+    );
+    assert!(clear > 1000 && ambiguous > 500 && sure > 800);
+    assert!(right * 100 >= clear * 99);
+    assert!(reported * 100 >= ambiguous * 95);
+    assert!(sure_right * 10 >= sure * 9);
+}
+
+/// Noise that swamps the margins must cost: the measure isn't blind.
+#[test]
+fn a_harsh_detector_is_worse_and_says_so() {
+    use crate::synthetic::{DetectorModel, case, run};
+    let model = DetectorModel::harsh();
+    let outcomes: Vec<_> = (0..300)
+        .map(|number| run(&case(7, number, &model)).1)
+        .collect();
+    let clear: Vec<_> = outcomes.iter().filter(|outcome| outcome.clear).collect();
+    let right = clear.iter().filter(|outcome| outcome.right).count();
+    assert!(right * 100 < clear.len() * 97);
+    let mean = |right: bool| {
+        let kappas: Vec<f64> = outcomes
+            .iter()
+            .filter(|o| o.right == right)
+            .map(|o| o.kappa)
+            .collect();
+        kappas.iter().sum::<f64>() / kappas.len() as f64
+    };
+    assert!(mean(true) > mean(false) + 0.3);
+}

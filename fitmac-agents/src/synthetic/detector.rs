@@ -6,7 +6,8 @@ use rand_distr::{Distribution, Normal};
 
 use crate::scene::{Detection, Scene};
 
-use super::layout::{Layout, TABLE};
+use super::catalogue::TABLE;
+use super::layout::Layout;
 
 /// Rates and magnitudes of a modelled detector.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,6 +47,24 @@ impl Default for DetectorModel {
     }
 }
 
+impl DetectorModel {
+    /// A bad day: a distant camera, clutter, labels that the detector doesn't
+    /// know well.
+    #[must_use]
+    pub fn harsh() -> Self {
+        Self {
+            noise_m: 0.025,
+            bias_m: 0.012,
+            size_noise: 0.15,
+            miss: 0.25,
+            confusion: 0.10,
+            double: 0.10,
+            phantom: 0.15,
+            confidence: (0.55, 0.18),
+        }
+    }
+}
+
 /// A detector that looks at one layout.
 pub(super) struct View<'m> {
     model: &'m DetectorModel,
@@ -59,7 +78,10 @@ fn normal(rng: &mut ChaCha8Rng, mean: f64, deviation: f64) -> f64 {
 impl<'m> View<'m> {
     pub(super) fn new(model: &'m DetectorModel, layout: &Layout, rng: &mut ChaCha8Rng) -> Self {
         let bias = |_: &super::layout::Thing| [0; 3].map(|_| normal(rng, 0.0, model.bias_m));
-        Self { model, biases: layout.things.iter().map(bias).collect() }
+        Self {
+            model,
+            biases: layout.things.iter().map(bias).collect(),
+        }
     }
 
     pub(super) fn frame(&mut self, layout: &Layout, stamp_ns: u64, rng: &mut ChaCha8Rng) -> Scene {

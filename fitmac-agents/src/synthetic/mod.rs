@@ -4,8 +4,10 @@
 //! from the grounder's scores, crisp and with margins, so that one can be
 //! wrong without the other.
 
+mod catalogue;
 mod detector;
 mod layout;
+mod placing;
 mod truth;
 
 use rand::{RngExt, SeedableRng};
@@ -48,13 +50,18 @@ pub fn case(seed: u64, number: u64, model: &DetectorModel) -> Case {
     rng.set_stream(number);
     let layout = Layout::draw(&mut rng);
     let mut view = detector::View::new(model, &layout, &mut rng);
-    let frames =
-        (0..FRAMES).map(|frame| view.frame(&layout, frame * FRAME_NS, &mut rng)).collect();
+    let frames = (0..FRAMES)
+        .map(|frame| view.frame(&layout, frame * FRAME_NS, &mut rng))
+        .collect();
     Case {
         instruction: layout.instruction(),
         kind: layout.kind(),
         truth: layout.truth(rng.random_range(0..usize::MAX)),
-        positions_m: layout.things.iter().map(|thing| thing.detection.position_m).collect(),
+        positions_m: layout
+            .things
+            .iter()
+            .map(|thing| thing.detection.position_m)
+            .collect(),
         frames,
     }
 }
@@ -111,7 +118,12 @@ pub fn run(case: &Case) -> (Grounding, Outcome) {
 
 fn nearest(position: &[f64; 3], all: &[[f64; 3]]) -> Option<usize> {
     let distance = |other: &[f64; 3]| -> f64 {
-        position.iter().zip(other).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+        position
+            .iter()
+            .zip(other)
+            .map(|(a, b)| (a - b) * (a - b))
+            .sum::<f64>()
+            .sqrt()
     };
     let (index, best) = all
         .iter()

@@ -95,7 +95,11 @@ fn between(object: &Disc, one: &Disc, two: &Disc) -> Holds {
     let middle = (along - length / 2.0).abs();
     both(
         within(middle, 0.3 * length, 0.5 * length),
-        within(across, 0.04_f64.max(0.2 * length), 0.10_f64.max(0.5 * length)),
+        within(
+            across,
+            0.04_f64.max(0.2 * length),
+            0.10_f64.max(0.5 * length),
+        ),
     )
 }
 
@@ -103,6 +107,9 @@ fn between(object: &Disc, one: &Disc, two: &Disc) -> Holds {
 fn beside(object: &Disc, other: &Disc, direction: [f64; 2]) -> Holds {
     let [x, y] = other.to(object);
     let along = x * direction[0] + y * direction[1];
-    let angle = (x * direction[1] - y * direction[0]).abs().atan2(along).to_degrees();
+    let angle = (x * direction[1] - y * direction[0])
+        .abs()
+        .atan2(along)
+        .to_degrees();
     both(within(angle, 30.0, 70.0), within(x.hypot(y), 0.35, 0.6))
 }
