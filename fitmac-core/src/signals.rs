@@ -15,6 +15,16 @@ use crate::{
     wire::{GraspClass, PlaceRelation},
 };
 
+/// True if a thing with thin walls is within reach of the fingers: then a
+/// nearly closed gripper may still hold something.
+fn thin_at_hand(p: &GripperParams, sample: &StateSample) -> bool {
+    robot::objects(sample).any(|o| {
+        let [hx, hy, _] = o.half_extent_m;
+        let reach = hx.max(hy) + p.held_radius_m;
+        class(o) == GraspClass::Bowl && vector::distance(o.position_m, sample.ee_position_m) < reach
+    })
+}
+
 /// What the gripper does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GripperView {
@@ -49,10 +59,16 @@ impl GripperView {
     /// leaves no other sign.
     pub(crate) fn new(
         p: &GripperParams,
-        width_m: f64,
+        sample: &StateSample,
         width_before_m: f64,
         commanded_closed: bool,
     ) -> Self {
+        let width_m = sample.gripper_width_m;
+        let empty_m = if thin_at_hand(p, sample) {
+            p.empty_thin_width_m
+        } else {
+            p.empty_width_m
+        };
         let change = width_m - width_before_m;
         let narrow = width_m < p.closed_ratio * p.open_width_m;
         let state = if change > p.moving_m || (!narrow && !commanded_closed) {
@@ -61,7 +77,7 @@ impl GripperView {
             GripperState::Closing
         } else if !narrow && width_m > p.open_width_m - 2.0 * p.moving_m {
             GripperState::Open
-        } else if width_m < p.empty_width_m {
+        } else if width_m < empty_m {
             GripperState::Empty
         } else {
             GripperState::Holding

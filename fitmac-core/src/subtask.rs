@@ -119,12 +119,7 @@ impl Subtask {
         commanded_closed: bool,
         verdict: Verdict,
     ) {
-        let gripper = GripperView::new(
-            &params.gripper,
-            sample.gripper_width_m,
-            width_before_m,
-            commanded_closed,
-        );
+        let gripper = GripperView::new(&params.gripper, sample, width_before_m, commanded_closed);
         let holding = gripper.state == GripperState::Holding;
         self.tracking
             .step(params, sample, self.lock.target(), holding);

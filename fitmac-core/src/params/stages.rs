@@ -88,6 +88,8 @@ stage! {
         moving_m: f64 = 0.001 in 0.00001..=0.02, "m";
         /// Closed narrower than this, it holds nothing.
         empty_width_m: f64 = 0.010 in 0.0..=0.1, "m";
+        /// The same where a thing with thin walls is at hand: a bowl's rim is 3 to 6 mm.
+        empty_thin_width_m: f64 = 0.002 in 0.0..=0.05, "m";
         /// An object this close to the tool centre point and moving with it is held.
         held_radius_m: f64 = 0.10 in 0.01..=0.3, "m";
     }

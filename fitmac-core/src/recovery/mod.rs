@@ -15,7 +15,6 @@ use crate::{
     gate::Routine,
     message::{Action, ObjectId, StateSample},
     params::{Params, RecoveryParams},
-    phase::is_pick,
     reason,
     signals::{GripperState, Signals},
     wire::{Phase, SubPhase},
@@ -336,14 +335,14 @@ impl Active {
         }
     }
 
-    /// A pick fits every phase before the release; a place that carries fits
-    /// every phase from the lift on.
+    /// A place that still carries does not fit a phase in which the object was
+    /// let go; nothing fits a completed subtask.
     fn fits(&self, phase: Phase) -> bool {
         match &self.running {
-            Running::Pick(_) => {
-                is_pick(phase) || matches!(phase, Phase::Transport | Phase::Descend)
+            Running::Place(place) if place.is_carrying() => {
+                !matches!(phase, Phase::Stabilise | Phase::Complete)
             }
-            Running::Place(place) => !place.is_carrying() || phase != Phase::Complete,
+            Running::Pick(_) | Running::Place(_) => phase != Phase::Complete,
         }
     }
 
