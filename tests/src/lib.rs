@@ -1,3 +1,4 @@
 //! What crosses crates.
 
 pub mod oracle;
+pub mod world;
