@@ -178,7 +178,7 @@ impl Controller {
         let (mode, faults) = self.judge_faults(now_ns, &tick, &report);
         let starts = match mode {
             Mode::Normal | Mode::Warn => self.play(now_ns, &mut report),
-            Mode::Hold | Mode::Stop => self.stand_still(mode),
+            Mode::Hold | Mode::Stop => self.stand_still(now_ns, mode, &mut report),
         };
         // Analysis ends here; what follows acts.
         self.act(now_ns, mode, faults, tick.dt_s, starts, report)
@@ -352,7 +352,7 @@ impl Controller {
     }
 
     /// Hold or stop: the queue is void; a zero increment starts once.
-    fn stand_still(&mut self, mode: Mode) -> Option<Start> {
+    fn stand_still(&mut self, now_ns: u64, mode: Mode, report: &mut Report) -> Option<Start> {
         let state = &mut self.state;
         let enters = state.mode < Mode::Hold;
         if mode == Mode::Stop {
@@ -363,6 +363,13 @@ impl Controller {
         if let Turn::Playing = state.turn {
             state.turn = Turn::Due;
         }
+        // A hold for want of a good chunk ends only with one: keep asking.
+        let owed = matches!(state.turn, Turn::Waiting(Waiting::Chunk { .. }))
+            || state.chunk.refused_in_a_row() > 0;
+        if owed && mode == Mode::Hold {
+            report.query = self.ask(now_ns);
+        }
+        let state = &self.state;
         (enters && state.robot.latest().is_some()).then(|| Start::still(&state.current.action))
     }
 
@@ -430,6 +437,9 @@ impl Controller {
         if decided.new_prompt {
             state.chunk.discard();
         }
+        if decided.advanced {
+            report.event = Some((EventKind::SubtaskChanged, None));
+        }
         match decided.step {
             Decided::Correct { action, waypoint_m } => {
                 state.chunk.discard();
@@ -458,7 +468,10 @@ impl Controller {
                 };
                 state.turn = Turn::Waiting(waiting);
                 match waiting {
-                    Waiting::Grounding { .. } => Some(Start::still(&state.current.action)),
+                    Waiting::Grounding { .. } => Some(Start {
+                        query: true,
+                        ..Start::still(&state.current.action)
+                    }),
                     Waiting::Chunk { .. } => self.wait(now_ns, waiting, report),
                 }
             }
@@ -469,15 +482,8 @@ impl Controller {
     fn wait(&mut self, now_ns: u64, waiting: Waiting, report: &mut Report) -> Option<Start> {
         match waiting {
             Waiting::Chunk { horizon } => {
-                if self.fill(horizon) {
-                    self.state.turn = Turn::Playing;
-                    let start = self
-                        .state
-                        .clock
-                        .is_due(now_ns)
-                        .then(|| self.pop())
-                        .flatten();
-                    return start.map(|s| Start { query: true, ..s });
+                if self.state.clock.is_due(now_ns) && self.fill(horizon) {
+                    return self.pop().map(|s| Start { query: true, ..s });
                 }
                 report.query = self.ask(now_ns);
                 None
@@ -496,7 +502,7 @@ impl Controller {
     /// Moves the prefix of the chunk at hand into the queue.
     fn fill(&mut self, horizon: u32) -> bool {
         let state = &mut self.state;
-        match state.chunk.take(state.current.policy_step) {
+        match state.chunk.take(state.queue.played()) {
             Some((chunk, consumed)) => {
                 let taken = state.queue.fill(chunk, consumed, horizon);
                 if taken == 0 {
@@ -530,6 +536,7 @@ impl Controller {
         let wanted = Wanted {
             state_sequence: state.robot.latest().map_or(0, |s| s.sequence),
             policy_step: state.current.policy_step,
+            played: state.queue.played(),
             epoch: state.subtask.lock.epoch(),
             subtask: state.subtask.index(),
             prompt_id: state.subtask.lock.binding().map_or(0, |b| b.prompt_id),

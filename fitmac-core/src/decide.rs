@@ -109,8 +109,10 @@ pub(crate) enum Decided {
 pub(crate) struct Query {
     pub(crate) decision: Decision,
     pub(crate) step: Decided,
-    /// The grounding changed: chunks of the old prompt are void.
+    /// The grounding or the subtask changed: chunks of the old prompt are void.
     pub(crate) new_prompt: bool,
+    /// The plan's next subtask is active from this query on.
+    pub(crate) advanced: bool,
 }
 
 /// Decides one query.
@@ -124,7 +126,7 @@ pub(crate) fn decide(
     verdicts: &mut Verdicts,
 ) -> Query {
     episode.queries = episode.queries.saturating_add(1);
-    advance(params, episode, subtask, grounding, verdicts);
+    let advanced = advance(params, episode, subtask, grounding, verdicts);
     let assessment = subtask.assess(
         params,
         now_ns,
@@ -136,6 +138,7 @@ pub(crate) fn decide(
     if assessment.diagnosis == Diagnosis::Success {
         subtask.estimator.complete();
     }
+    let phase = subtask.estimator.phase();
     let gate = authorise(&params.gate, &params.switches, &assessment.question);
     let route = route(subtask.recovery.is_pending(), gate);
     let other = subtask.other();
@@ -155,6 +158,7 @@ pub(crate) fn decide(
     let decision = Decision {
         kappa: assessment.kappa,
         evidence: assessment.evidence,
+        phase,
         diagnosis: assessment.diagnosis,
         route,
         reasons,
@@ -164,7 +168,8 @@ pub(crate) fn decide(
     Query {
         decision,
         step,
-        new_prompt,
+        new_prompt: new_prompt || advanced,
+        advanced,
     }
 }
 
@@ -175,13 +180,15 @@ fn advance(
     subtask: &mut Subtask,
     grounding: &mut GroundingIntake,
     verdicts: &mut Verdicts,
-) {
+) -> bool {
     let next = subtask.index().saturating_add(1);
-    if subtask.succeeded(params, verdicts.verdict()) && episode.has_subtask(next) {
+    let advances = subtask.succeeded(params, verdicts.verdict()) && episode.has_subtask(next);
+    if advances {
         *subtask = Subtask::fresh(next, subtask.lock().epoch());
         grounding.keep_only(next);
         verdicts.forget();
     }
+    advances
 }
 
 const fn closed_reasons(gate: Authorisation) -> u64 {
@@ -245,6 +252,9 @@ fn correct_execution(
         subtask.recovery.cancel();
         return (Decided::Policy, reason::NO_ACTION, false);
     };
+    if !subtask.recovery.is_pending() {
+        subtask.begin_correction(assessment.question.routine);
+    }
     let scene = subtask.scene(params, sample, &signals, assessment);
     let mut reasons = reason::CORRECTION_PENDING;
     if !subtask.recovery.is_pending() {

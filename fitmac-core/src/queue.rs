@@ -50,6 +50,7 @@ pub struct ActionQueue {
     actions: [[f32; ACTION_DIM]; CHUNK_CAPACITY],
     next: usize,
     end: usize,
+    played: u64,
 }
 
 impl ActionQueue {
@@ -58,7 +59,14 @@ impl ActionQueue {
             actions: [[0.0; ACTION_DIM]; CHUNK_CAPACITY],
             next: 0,
             end: 0,
+            played: 0,
         }
+    }
+
+    /// Actions of the policy that were executed so far.
+    #[must_use]
+    pub const fn played(&self) -> u64 {
+        self.played
     }
 
     /// Actions left.
@@ -93,7 +101,8 @@ impl ActionQueue {
             return None;
         }
         let raw = *self.actions.get(self.next)?;
-        self.next += 1;
+        self.next = self.next.saturating_add(1);
+        self.played = self.played.wrapping_add(1);
         Some(decode(params, raw))
     }
 }

@@ -5,7 +5,7 @@ use crate::{
     message::{ACTION_DIM, Action, TraceRecord},
     params::Params,
     subtask::Subtask,
-    wire::{Diagnosis, EventKind, Mode, Route, Verdict},
+    wire::{Diagnosis, EventKind, Mode, Phase, Route, Verdict},
 };
 
 /// What was decided at a query.
@@ -15,6 +15,8 @@ pub struct Decision {
     pub kappa: f64,
     /// Evidence at hand.
     pub evidence: u64,
+    /// The phase that was diagnosed.
+    pub phase: Phase,
     /// The diagnosis.
     pub diagnosis: Diagnosis,
     /// The route.
@@ -32,6 +34,7 @@ impl Decision {
     pub const NONE: Self = Self {
         kappa: 0.0,
         evidence: 0,
+        phase: Phase::Approach,
         diagnosis: Diagnosis::None,
         route: Route::Base,
         reasons: 0,
@@ -64,6 +67,12 @@ pub(crate) fn record(
     let signals = subtask.signals();
     let target = signals.and_then(|s| s.target);
     let streaks = subtask.streaks;
+    // What a query leads to may begin a new attempt; its record shows the
+    // phase that was judged.
+    let phase = match kind {
+        EventKind::Query => decision.phase,
+        _ => subtask.estimator.phase(),
+    };
     TraceRecord {
         stamp_ns: moment.stamp_ns,
         query: moment.query,
@@ -81,7 +90,7 @@ pub(crate) fn record(
         target: subtask.lock().target(),
         other: decision.other,
         kind: kind.code(),
-        phase: subtask.estimator.phase().code(),
+        phase: phase.code(),
         diagnosis: decision.diagnosis.code(),
         route: decision.route.code(),
         mode: moment.mode.code(),

@@ -4,7 +4,7 @@
 
 use crate::{
     evidence,
-    intake::{confidence, is_newer},
+    intake::is_newer,
     message::{CriticReport, VerifierReport},
     params::Evidence,
     wire::{CriticLabel, Verdict},
@@ -67,7 +67,7 @@ impl Verdicts {
             report.subtask == subtask,
         ) {
             self.critic_sequence = Some(report.sequence);
-            self.critic = Some((label, confidence(report.confidence)));
+            self.critic = Some((label, clamped(report.confidence)));
         }
     }
 
@@ -83,5 +83,14 @@ impl Verdicts {
             },
             _ => 0,
         }
+    }
+}
+
+/// A confidence clamped to [0, 1]; 0 for a NaN.
+fn clamped(confidence: f64) -> f64 {
+    if confidence.is_nan() {
+        0.0
+    } else {
+        confidence.clamp(0.0, 1.0)
     }
 }

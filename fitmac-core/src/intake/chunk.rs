@@ -2,8 +2,8 @@
 //!
 //! One question is open at a time. The answer must repeat its number, epoch
 //! and subtask. How many of its actions are out of date is counted, never
-//! estimated: it is the number of policy steps that were executed since the
-//! question was asked.
+//! estimated: it is the number of the policy's actions that were executed since
+//! the question was asked. Steps of standing still make no action out of date.
 
 use super::{Refusal, age_ns, is_newer, ms_to_ns};
 use crate::{
@@ -28,6 +28,7 @@ pub enum Outcome {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Question {
     query: PolicyQuery,
+    played: u64,
     first_asked_ns: u64,
     last_asked_ns: u64,
 }
@@ -36,9 +37,10 @@ struct Question {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Answer {
     None,
-    /// `latest` answers a question that was asked at this policy step.
+    /// `latest` answers a question that was asked after so many of the policy's
+    /// actions.
     Ready {
-        asked_at_step: u64,
+        played: u64,
     },
 }
 
@@ -126,22 +128,21 @@ impl ChunkIntake {
         self.next_query_id = self.next_query_id.wrapping_add(1);
         self.question = Some(Question {
             query,
+            played: wanted.played,
             first_asked_ns: now_ns,
             last_asked_ns: now_ns,
         });
         Some(query)
     }
 
-    /// The chunk at hand and the number of its actions that were already
-    /// overtaken at `policy_step`; it is handed out once.
-    pub(crate) fn take(&mut self, policy_step: u64) -> Option<(&ActionChunk, usize)> {
-        let Answer::Ready { asked_at_step } = self.answer else {
+    /// The chunk at hand and the number of its actions that are out of date
+    /// after `played` actions of the policy; it is handed out once.
+    pub(crate) fn take(&mut self, played: u64) -> Option<(&ActionChunk, usize)> {
+        let Answer::Ready { played: before } = self.answer else {
             return None;
         };
         self.answer = Answer::None;
-        let consumed = policy_step
-            .saturating_sub(asked_at_step)
-            .min(CHUNK_CAPACITY as u64);
+        let consumed = played.saturating_sub(before).min(CHUNK_CAPACITY as u64);
         Some((&self.latest, consumed as usize))
     }
 
@@ -153,7 +154,7 @@ impl ChunkIntake {
 
     pub(crate) fn step(&mut self, params: &Params, now_ns: u64, chunk: &ActionChunk) -> Outcome {
         match self.examine(params, now_ns, chunk) {
-            Ok(asked_at_step) => {
+            Ok(played) => {
                 let n = chunk.horizon as usize;
                 let equal = self.accepted > 0
                     && self.latest.horizon == chunk.horizon
@@ -175,7 +176,7 @@ impl ChunkIntake {
                     .iter_mut()
                     .skip(n)
                     .for_each(|a| *a = [0.0; ACTION_DIM]);
-                self.answer = Answer::Ready { asked_at_step };
+                self.answer = Answer::Ready { played };
                 self.question = None;
                 self.accepted = self.accepted.saturating_add(1);
                 self.refused_in_a_row = 0;
@@ -232,7 +233,7 @@ impl ChunkIntake {
         if chunk.query_id != question.query.query_id {
             return Err(Refusal::Query);
         }
-        Ok(question.query.policy_step)
+        Ok(question.played)
     }
 }
 
@@ -241,6 +242,7 @@ impl ChunkIntake {
 pub(crate) struct Wanted {
     pub(crate) state_sequence: u64,
     pub(crate) policy_step: u64,
+    pub(crate) played: u64,
     pub(crate) epoch: u64,
     pub(crate) subtask: u32,
     pub(crate) prompt_id: u32,

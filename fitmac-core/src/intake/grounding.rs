@@ -81,7 +81,8 @@ impl GroundingIntake {
         if record.subtask != subtask {
             return Outcome::Refused(Refusal::Subtask);
         }
-        if record.epoch < epoch {
+        let overtaken = self.proposal.is_some_and(|p| record.epoch < p.epoch);
+        if record.epoch < epoch || (overtaken && record.epoch > epoch) {
             return Outcome::Refused(Refusal::Epoch);
         }
         if record.epoch == epoch {
