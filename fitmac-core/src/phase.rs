@@ -198,6 +198,11 @@ impl PhaseEstimator {
                     }
                 }
             }
+            // Let go before the carry began: the lift has failed.
+            Carry::Lifted { .. } if open && is_pick(self.phase) => Carry::Resting {
+                rest_z_m: None,
+                risen_steps: 0,
+            },
             Carry::Lifted { .. } if open => Carry::Released,
             Carry::Lifted { top_z_m, grip_z_m } => Carry::Lifted {
                 top_z_m: top_z_m.max(z),
@@ -213,6 +218,10 @@ impl PhaseEstimator {
                 Phase::Stabilise
             }
             Carry::Released => Phase::Release,
+            // An odd grasp shows only in the lift: it has no grasp phase.
+            Carry::Lifted { .. } if matches!(self.phase, Phase::Approach | Phase::Grasp) => {
+                Phase::Lift
+            }
             Carry::Lifted { .. } => match &signals.destination {
                 Some(d)
                     if d.distance_xy_m <= params.descend_xy_m
@@ -252,7 +261,8 @@ impl PhaseEstimator {
             Some((phase, seen)) if phase == estimate => seen.saturating_add(1),
             _ => 1,
         };
-        if seen < params.hysteresis_steps {
+        // A release is latched already: it needs no second look.
+        if seen < params.hysteresis_steps && estimate != Phase::Release {
             self.candidate = Some((estimate, seen));
             return Change::None;
         }

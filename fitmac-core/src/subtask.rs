@@ -2,7 +2,7 @@
 //! the one before. A change of subtask is a construction.
 
 use crate::{
-    attempt::Attempt,
+    attempt::{Attempt, in_region},
     diagnosis::{self, DiagnosisHistory},
     evidence,
     gate::{self, Routine, Streaks},
@@ -10,7 +10,7 @@ use crate::{
     message::{GroundingRecord, ObjectId, StateSample},
     monitor::Monitor,
     params::Params,
-    phase::{Change, PhaseEstimator, is_pick, is_place},
+    phase::{Carry, Change, PhaseEstimator, is_pick, is_place},
     recovery::{Recovery, Scene, episode_left},
     signals::{GripperState, GripperView, Memory, Signals},
     tracking::Tracking,
@@ -251,6 +251,9 @@ impl Subtask {
 
     /// What an execution correction would run now.
     fn routine(&self, params: &Params) -> Routine {
+        if self.estimator.carry() == Carry::Released && self.outcome_unknown() {
+            return Routine::Indirect;
+        }
         let carrying = self.estimator.is_lifted() && is_place(self.estimator.phase());
         if !carrying {
             return Routine::Pick;
@@ -260,6 +263,14 @@ impl Subtask {
             _ if params.switches.hard_place => Routine::Indirect,
             _ => Routine::Place,
         }
+    }
+
+    /// Released, and nobody can say where it should lie: geometry knows no
+    /// direct destination and the verifier did not deny it. A thing that may
+    /// lie right is left alone.
+    fn outcome_unknown(&self) -> bool {
+        let denied = self.attempt.latched() & evidence::VERIFIER_NEGATIVE != 0;
+        !denied && self.signals.as_ref().and_then(in_region).is_none()
     }
 
     fn has_destination(&self) -> bool {
@@ -272,6 +283,14 @@ impl Subtask {
         let misplaced =
             evidence & evidence::VERIFIER_NEGATIVE != 0 && diagnosis == Diagnosis::PlaceFailure;
         if misplaced && !self.recovery.is_pending() {
+            self.restart_attempt();
+        }
+    }
+
+    /// A pick that follows a release, a drop or a misplaced object begins a new
+    /// attempt: the place that failed is over.
+    pub(crate) fn begin_correction(&mut self, routine: Routine) {
+        if routine == Routine::Pick && is_place(self.estimator.phase()) {
             self.restart_attempt();
         }
     }
@@ -298,8 +317,12 @@ impl Subtask {
     /// target moves, every window that used the old one is cleared.
     pub(crate) fn commit(&mut self, record: &GroundingRecord) {
         let before = self.lock.target();
+        let destination = self.lock.binding().map(|b| b.destination);
         self.lock.commit(record);
         self.rebind = Rebind::Idle;
+        if destination != self.lock.binding().map(|b| b.destination) {
+            self.monitor.forget();
+        }
         if before != self.lock.target() {
             self.monitor.forget();
             self.streaks = Streaks::NONE;

@@ -35,15 +35,34 @@ pub fn closing_axis(sample: &StateSample) -> Vector3 {
     hand(sample).orientation.rotate([0.0, 1.0, 0.0])
 }
 
-/// Where to bring the tool centre point to grasp `target`. A bowl offers two
-/// points of its rim along the closing direction: the freer one is taken, the
-/// nearer one if both are free; every other re-descent tries the other one.
+/// A bowl offers two points of its rim along the closing direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Towards the hand's y axis.
+    Positive,
+    /// Away from it.
+    Negative,
+}
+
+impl Side {
+    /// The other one.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::Positive => Self::Negative,
+            Self::Negative => Self::Positive,
+        }
+    }
+}
+
+/// Where to bring the tool centre point to grasp `target`: at `side` of a
+/// bowl's rim, at the axis of anything else.
 #[must_use]
 pub fn grasp_point(
     params: &Grasp,
     sample: &StateSample,
     target: &TargetView,
-    descent: u32,
+    side: Side,
 ) -> Vector3 {
     let [x, y, z] = target.position_m;
     let z = z + grasp_height(params, target.class, target.half_height_m);
@@ -54,19 +73,28 @@ pub fn grasp_point(
         return [x, y, z];
     }
     let (ux, uy) = (radius * ax / length, radius * ay / length);
-    let sides = [[x + ux, y + uy, z], [x - ux, y - uy, z]];
-    let [first, second] = sides.map(|p| {
+    match side {
+        Side::Positive => [x + ux, y + uy, z],
+        Side::Negative => [x - ux, y - uy, z],
+    }
+}
+
+/// The freer side of a rim, the nearer one if both are free. A hand that is
+/// under way changes what is near: the choice is to be made once.
+#[must_use]
+pub fn better_side(params: &Grasp, sample: &StateSample, target: &TargetView) -> Side {
+    let cost = |side| {
+        let p = grasp_point(params, sample, target, side);
         (
             crowd(sample, target.id, p),
             vector::distance(p, sample.ee_position_m),
         )
-    });
-    let second_is_better = second.0 < first.0 || (second.0 == first.0 && second.1 < first.1);
-    let [a, b] = sides;
-    if second_is_better == descent.is_multiple_of(2) {
-        b
+    };
+    let (positive, negative) = (cost(Side::Positive), cost(Side::Negative));
+    if negative.0 < positive.0 || (negative.0 == positive.0 && negative.1 < positive.1) {
+        Side::Negative
     } else {
-        a
+        Side::Positive
     }
 }
 

@@ -261,7 +261,9 @@ impl Recovery {
             }
         };
         self.activations = self.activations.saturating_add(1);
+        // The pick comes first: what the episode has left goes to it.
         let budget = budget.min(episode_left);
+        let reserve = reserve.min(budget.saturating_sub(p.pick_budget));
         self.active = Some(Active {
             running,
             budget,

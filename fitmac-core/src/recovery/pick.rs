@@ -3,7 +3,7 @@
 
 use super::{
     Flow, Scene,
-    geometry::{grasp_point, levelling, path_top},
+    geometry::{Side, better_side, grasp_point, levelling, path_top},
     waypoint::{Grip, Motion},
 };
 use crate::{
@@ -49,7 +49,9 @@ enum Step {
 pub(super) struct Pick {
     step: Step,
     redescents_left: u32,
-    descents: u32,
+    /// Where to grasp a rim, once that was chosen; each re-descent tries the
+    /// other side.
+    side: Option<Side>,
 }
 
 /// Whether the routine goes on.
@@ -84,7 +86,7 @@ impl Pick {
         Self {
             step,
             redescents_left,
-            descents: 0,
+            side: None,
         }
     }
 
@@ -123,6 +125,14 @@ impl Pick {
         }
     }
 
+    fn grasp_point(&mut self, scene: &Scene<'_>, target: &TargetView) -> [f64; 3] {
+        let params = &scene.params.grasp;
+        let side = *self
+            .side
+            .get_or_insert_with(|| better_side(params, scene.sample, target));
+        grasp_point(params, scene.sample, target, side)
+    }
+
     fn go(&mut self, step: Step) -> Flow<Outcome> {
         self.step = step;
         Flow::Again
@@ -157,7 +167,7 @@ impl Pick {
 
     fn hover(&mut self, scene: &Scene<'_>, target: &TargetView, turning: u32) -> Flow<Outcome> {
         let p = &scene.params.recovery;
-        let goal = grasp_point(&scene.params.grasp, scene.sample, target, self.descents);
+        let goal = self.grasp_point(scene, target);
         let [gx, gy, _] = goal;
         let [x, y, z] = scene.signals.ee_m;
         let top = target.position_m[2] + target.half_height_m;
@@ -193,7 +203,7 @@ impl Pick {
 
     fn descend(&mut self, scene: &Scene<'_>, target: &TargetView) -> Flow<Outcome> {
         let p = &scene.params.recovery;
-        let goal = grasp_point(&scene.params.grasp, scene.sample, target, self.descents);
+        let goal = self.grasp_point(scene, target);
         let off_m = scene.horizontal_to(goal);
         if off_m > 2.0 * p.hover_xy_m {
             // The object was pushed, or never stood there: line up again.
@@ -262,7 +272,7 @@ impl Pick {
             return Flow::Done(Outcome::Failed);
         };
         self.redescents_left = left;
-        self.descents = self.descents.saturating_add(1);
+        self.side = self.side.map(Side::other);
         let goal_z_m = scene.signals.ee_m[2] + 0.5 * scene.params.recovery.hover_m;
         self.go(Step::Reopen {
             queries: 0,

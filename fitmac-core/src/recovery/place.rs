@@ -29,10 +29,21 @@ enum Step {
     LiftCarry,
     MoveAbove,
     Lower,
-    ReleaseReady,
-    ReleaseHold { queries: u32, at_m: Vector3 },
-    Retreat { queries: u32, goal_m: Vector3 },
-    Settle { queries: u32 },
+    /// The gripper was told to open, once.
+    ReleaseReady {
+        at_m: Vector3,
+    },
+    ReleaseHold {
+        queries: u32,
+        at_m: Vector3,
+    },
+    Retreat {
+        queries: u32,
+        goal_m: Vector3,
+    },
+    Settle {
+        queries: u32,
+    },
 }
 
 /// A running place.
@@ -66,7 +77,7 @@ impl Place {
             Step::LiftCarry => SubPhase::LiftCarry,
             Step::MoveAbove => SubPhase::MoveAbove,
             Step::Lower => SubPhase::Lower,
-            Step::ReleaseReady => SubPhase::ReleaseReady,
+            Step::ReleaseReady { .. } => SubPhase::ReleaseReady,
             Step::ReleaseHold { .. } => SubPhase::ReleaseHold,
             Step::Retreat { .. } => SubPhase::Retreat,
             Step::Settle { .. } => SubPhase::Settle,
@@ -75,10 +86,7 @@ impl Place {
 
     /// True until the gripper was told to open.
     pub(super) const fn is_carrying(&self) -> bool {
-        matches!(
-            self.step,
-            Step::LiftCarry | Step::MoveAbove | Step::Lower | Step::ReleaseReady
-        )
+        matches!(self.step, Step::LiftCarry | Step::MoveAbove | Step::Lower)
     }
 
     pub(super) fn step(
@@ -94,11 +102,7 @@ impl Place {
             Step::LiftCarry => self.lift_carry(scene, target, destination),
             Step::MoveAbove => self.move_above(scene, target, destination),
             Step::Lower => self.lower(scene, target, destination),
-            Step::ReleaseReady => {
-                let at_m = scene.signals.ee_m;
-                self.step = Step::ReleaseHold { queries: 0, at_m };
-                Flow::Done(Outcome::Act(Motion::to(at_m, Grip::Open)))
-            }
+            Step::ReleaseReady { at_m } => self.go(Step::ReleaseHold { queries: 1, at_m }),
             Step::ReleaseHold { queries, at_m } => self.release_hold(scene, queries, at_m),
             Step::Retreat { queries, goal_m } => self.retreat(scene, queries, goal_m),
             Step::Settle { queries } => self.settle(scene, queries),
@@ -180,7 +184,9 @@ impl Place {
         };
         let landed = scene.is_blocked() && d.clearance_m < p.release_on_m + 0.04;
         if (d.clearance_m <= low_enough || landed) && d.distance_xy_m <= align {
-            return self.go(Step::ReleaseReady);
+            let at_m = scene.signals.ee_m;
+            self.step = Step::ReleaseReady { at_m };
+            return Flow::Done(Outcome::Act(Motion::to(at_m, Grip::Open)));
         }
         let [x, y, _] = aligned(scene, target, d);
         let z = scene.signals.ee_m[2] + goal_clearance - d.clearance_m;
