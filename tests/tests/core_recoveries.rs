@@ -1,46 +1,376 @@
 //! Every recovery, closed loop, in the toy world: each must end in success.
+//! A failing test prints the table of decisions.
 
-use fitmac_core::{Params, wire::Provenance};
-use fitmac_tests::world::{
-    Agent, Answer, BOX, Behaviour, CAN, OTHER, Policy, Scene, Session, table,
+use fitmac_core::{
+    Params,
+    message::TraceRecord,
+    params::Switches,
+    wire::{DestinationKind, Diagnosis, Mode, Provenance, Route, SubPhase},
 };
+use fitmac_tests::world::{
+    Agent, Answer, BASKET, Behaviour, CAN, OTHER, PLATE, Policy, Scene, Session, Verifier, table,
+};
+use kinematics::rotation::UnitQuaternion;
 
-fn show(session: &Session) {
-    println!("{}", table::HEADING);
-    for record in table::changes(&session.queries) {
-        println!("{}", table::row(record));
-    }
-    println!("held {} ee {:?}", session.world.held(), session.world.ee_m());
-    for b in &session.world.bodies {
-        println!("  {} {:?}", b.id, b.position_m);
-    }
+const STEPS: u64 = 400;
+
+fn profiles() -> [(&'static str, Params); 2] {
+    [("guarded", Params::guarded()), ("paper", Params::paper())]
 }
 
-fn run(name: &str, mut session: Session, steps: u64) {
-    let done = session.run(steps);
-    println!("=== {name}: {done} at {} s", session.world.now_ns() as f64 * 1e-9);
-    show(&session);
-    for e in &session.events { println!("event {} mode {} detail {} reasons {:?}", e.kind, e.mode, e.detail, fitmac_core::reason::names(e.reasons).collect::<Vec<_>>()); }
+fn scenes() -> [Scene; 4] {
+    [
+        Scene::can_to_plate(),
+        Scene::bowl_to_plate(),
+        Scene::box_to_plate(),
+        Scene::can_to_basket(),
+    ]
+}
+
+fn session(params: Params, scene: &Scene, behaviour: Behaviour) -> Session {
+    let agent = Agent::knowing(scene);
+    Session::new(params, scene.clone(), Policy::new(behaviour), agent)
+}
+
+fn decisions(session: &Session) -> String {
+    let rows = table::changes(&session.queries);
+    let rows: Vec<_> = rows.into_iter().map(table::row).collect();
+    format!("{}\n{}", table::HEADING, rows.join("\n"))
+}
+
+/// Runs to success and returns the records.
+fn succeeds(name: &str, mut session: Session) -> Session {
+    let done = session.run(STEPS);
+    assert!(done, "{name}: not done\n{}", decisions(&session));
+    session
+}
+
+fn took(session: &Session, route: Route) -> usize {
+    let is = |r: &&TraceRecord| r.route == route.code();
+    session.queries.iter().filter(is).count()
 }
 
 #[test]
-fn explore() {
-    for (profile, params) in [("guarded", Params::guarded()), ("paper", Params::paper())] {
-        for scene in [Scene::can_to_plate(), Scene::bowl_to_plate(), Scene::box_to_plate(), Scene::can_to_basket()] {
+fn every_way_to_fail_ends_in_success_with_every_object_in_both_profiles() {
+    for (profile, params) in profiles() {
+        for scene in scenes() {
             for behaviour in [
-                Behaviour::Competent,
                 Behaviour::WrongObject(OTHER),
                 Behaviour::StallsAbove(0.05),
+                Behaviour::StallsAbove(0.15),
                 Behaviour::MissesPlace([0.12, 0.0]),
+                Behaviour::MissesPlace([0.0, -0.14]),
                 Behaviour::Dithers,
                 Behaviour::Replays([0.0, 0.1]),
+                Behaviour::Replays([-0.08, 0.05]),
                 Behaviour::Frozen,
             ] {
-                let name = format!("{profile} target {} on {} {behaviour:?}", scene.target, scene.destination);
-                let agent = Agent::knowing(&scene);
-                run(&name, Session::new(params, scene.clone(), Policy::new(behaviour), agent), 400);
+                let name = format!(
+                    "{profile}, {behaviour:?}, {} on {}",
+                    scene.target, scene.destination
+                );
+                let end = succeeds(&name, session(params, &scene, behaviour));
+                assert!(
+                    end.controller.state().episode().correction_queries() > 0,
+                    "{name}"
+                );
             }
         }
     }
-    let _ = (BOX, CAN, Answer::Silence, Provenance::Rules);
+}
+
+#[test]
+fn a_competent_policy_is_left_alone() {
+    for (profile, params) in profiles() {
+        for scene in scenes() {
+            for verifier in [Verifier::Absent, Verifier::Successes, Verifier::Both] {
+                let name = format!("{profile}, {} on {}", scene.target, scene.destination);
+                let mut session = session(params, &scene, Behaviour::Competent);
+                session.verifier = verifier;
+                let mut end = succeeds(&name, session);
+                // And also afterwards, when it has nothing left to do.
+                end.run_until(200, |_| false);
+                let episode = end.controller.state().episode();
+                assert_eq!(
+                    episode.correction_queries(),
+                    0,
+                    "{name}\n{}",
+                    decisions(&end)
+                );
+                assert_eq!(took(&end, Route::Execution), 0, "{name}");
+                assert!(
+                    end.scene.is_done(&end.world),
+                    "{name}: it stays where it is"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn with_nothing_switched_on_every_failure_stays_one() {
+    for behaviour in [
+        Behaviour::WrongObject(OTHER),
+        Behaviour::StallsAbove(0.05),
+        Behaviour::MissesPlace([0.12, 0.0]),
+        Behaviour::Dithers,
+        Behaviour::Replays([0.0, 0.1]),
+        Behaviour::Frozen,
+    ] {
+        let params = Params {
+            switches: Switches::BACKBONE_ONLY,
+            ..Params::guarded()
+        };
+        let name = format!("{behaviour:?}");
+        let mut session = session(params, &Scene::can_to_plate(), behaviour);
+        assert!(
+            !session.run(STEPS),
+            "{name} is no failure\n{}",
+            decisions(&session)
+        );
+        assert_eq!(session.controller.state().episode().correction_queries(), 0);
+    }
+}
+
+#[test]
+fn a_wrong_first_binding_is_looked_at_again_and_the_policy_obeys() {
+    for (profile, params) in profiles() {
+        let scene = Scene::can_to_plate();
+        // The first rule takes the other can; a second look finds the right one.
+        let agent = Agent::new([
+            Answer::Target {
+                id: OTHER,
+                kappa: 0.28,
+                provenance: Provenance::Rules,
+            },
+            Answer::Target {
+                id: CAN,
+                kappa: 0.9,
+                provenance: Provenance::Recheck,
+            },
+        ]);
+        let session = Session::new(params, scene, Policy::new(Behaviour::Competent), agent);
+        let end = succeeds(profile, session);
+        assert_eq!(
+            end.controller.state().episode().rebinds(),
+            1,
+            "{}",
+            decisions(&end)
+        );
+        assert_eq!(end.controller.state().episode().correction_queries(), 0);
+    }
+}
+
+#[test]
+fn an_approach_to_another_object_doubts_the_binding_before_it_doubts_the_execution() {
+    for (profile, params) in profiles() {
+        let scene = Scene::can_to_plate();
+        let agent = Agent::new([
+            Answer::Target {
+                id: CAN,
+                kappa: 0.6,
+                provenance: Provenance::Rules,
+            },
+            Answer::Target {
+                id: CAN,
+                kappa: 0.9,
+                provenance: Provenance::Recheck,
+            },
+        ]);
+        let policy = Policy::new(Behaviour::WrongObject(OTHER));
+        let end = succeeds(profile, Session::new(params, scene, policy, agent));
+        let acted: Vec<_> = end
+            .queries
+            .iter()
+            .filter(|r| {
+                r.diagnosis == Diagnosis::TargetCorrection.code()
+                    || r.route == Route::Execution.code()
+            })
+            .map(|r| (r.diagnosis, r.route))
+            .collect();
+        assert_eq!(
+            acted.last(),
+            Some(&(Diagnosis::PickFailure.code(), Route::Execution.code())),
+            "{profile}\n{}",
+            decisions(&end)
+        );
+        assert!(
+            end.rebinds >= 2,
+            "{profile}: it was asked for, and asked again"
+        );
+    }
+}
+
+#[test]
+fn agents_that_never_answer_a_second_time_do_not_stop_the_recovery() {
+    for (profile, params) in profiles() {
+        let agent = Agent::new([
+            Answer::Target {
+                id: CAN,
+                kappa: 0.6,
+                provenance: Provenance::Rules,
+            },
+            Answer::Silence,
+        ]);
+        let policy = Policy::new(Behaviour::WrongObject(OTHER));
+        succeeds(
+            profile,
+            Session::new(params, Scene::can_to_plate(), policy, agent),
+        );
+    }
+}
+
+#[test]
+fn agents_that_never_answer_at_all_leave_the_base_policy_in_charge() {
+    for (profile, params) in profiles() {
+        let agent = Agent::new([Answer::Silence]);
+        let policy = Policy::new(Behaviour::Competent);
+        let end = succeeds(
+            profile,
+            Session::new(params, Scene::can_to_plate(), policy, agent),
+        );
+        assert_eq!(
+            end.controller.state().episode().correction_queries(),
+            0,
+            "{profile}"
+        );
+    }
+}
+
+#[test]
+fn a_weak_grasp_is_tried_again_with_another_descent() {
+    for (profile, params) in profiles() {
+        for scene in scenes() {
+            let mut session = session(params, &scene, Behaviour::Frozen);
+            session.world.plant.weak_grasps = 2;
+            let end = succeeds(profile, session);
+            let reopened = end
+                .queries
+                .iter()
+                .filter(|r| r.sub_phase == SubPhase::Reopen.code());
+            assert!(reopened.count() >= 2, "{profile}\n{}", decisions(&end));
+        }
+    }
+}
+
+#[test]
+fn an_object_that_slips_out_of_the_hand_is_picked_up_again() {
+    for (profile, params) in profiles() {
+        for behaviour in [Behaviour::Competent, Behaviour::Frozen] {
+            for scene in scenes() {
+                let mut session = session(params, &scene, behaviour.clone());
+                session.world.plant.drop_above_m = Some(0.15);
+                let name = format!("{profile}, {behaviour:?}, {}", scene.target);
+                let end = succeeds(&name, session);
+                assert_eq!(end.world.plant.drop_above_m, None, "{name}: it did slip");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_hand_that_arrives_tilted_is_levelled_in_the_guarded_profile_only() {
+    for (profile, params) in profiles() {
+        let scene = Scene::box_to_plate();
+        let mut session = session(params, &scene, Behaviour::Frozen);
+        let tilt = UnitQuaternion::from_rotation_vector([0.3, 0.0, 0.0]);
+        let tilted = tilt * session.world.orientation();
+        session.world.set_orientation(tilted);
+        let end = succeeds(profile, session);
+        let turned = end.queries.iter().any(|r| r.action[3..6] != [0.0; 3]);
+        assert_eq!(turned, profile == "guarded", "{profile}");
+        let hand = end.world.orientation().rotate([0.0, 0.0, 1.0]);
+        assert_eq!(
+            hand[2] < -0.995,
+            profile == "guarded",
+            "{profile}: {hand:?}"
+        );
+    }
+}
+
+#[test]
+fn an_arm_that_freezes_at_a_joint_limit_backs_out() {
+    for (profile, params) in profiles() {
+        let mut scene = Scene::can_to_plate();
+        // The plate lies as far out as the arm reaches while the can is high.
+        if let Some(plate) = scene.world.body_mut(PLATE) {
+            plate.position_m = [0.62, 0.0, 0.01];
+        }
+        scene.world.plant.reach_m = 0.625;
+        let session = session(params, &scene, Behaviour::Frozen);
+        let end = succeeds(profile, session);
+        assert!(end.controller.state().episode().correction_queries() > 0);
+    }
+}
+
+#[test]
+fn a_destination_that_only_a_relation_describes_is_left_to_the_base_policy() {
+    for (profile, params) in profiles() {
+        let mut agent = Agent::knowing(&Scene::can_to_plate());
+        agent.destination = DestinationKind::Relational;
+        let policy = Policy::new(Behaviour::MissesPlace([0.12, 0.0]));
+        let mut session = Session::new(params, Scene::can_to_plate(), policy, agent);
+        session.verifier = Verifier::Absent;
+        assert!(!session.run(STEPS), "geometry can't place it");
+        assert_eq!(
+            session.controller.state().episode().correction_queries(),
+            0,
+            "{profile}: what may lie right is left alone\n{}",
+            decisions(&session)
+        );
+    }
+}
+
+#[test]
+fn a_relational_destination_that_the_verifier_denies_is_picked_up_again() {
+    for (profile, params) in profiles() {
+        let mut agent = Agent::knowing(&Scene::can_to_plate());
+        agent.destination = DestinationKind::Relational;
+        let policy = Policy::new(Behaviour::MissesPlace([0.12, 0.0]));
+        let mut session = Session::new(params, Scene::can_to_plate(), policy, agent);
+        session.verifier = Verifier::Both;
+        session.run(STEPS);
+        let last = session
+            .queries
+            .iter()
+            .filter(|r| r.route == Route::Execution.code());
+        assert!(last.count() > 0, "{profile}\n{}", decisions(&session));
+        let placed = session
+            .queries
+            .iter()
+            .any(|r| r.sub_phase == SubPhase::MoveAbove.code());
+        assert!(!placed, "{profile}: it never places by geometry");
+    }
+}
+
+#[test]
+fn a_container_takes_the_object_below_its_rim() {
+    for (profile, params) in profiles() {
+        let end = succeeds(
+            profile,
+            session(params, &Scene::can_to_basket(), Behaviour::Frozen),
+        );
+        let released = end
+            .queries
+            .iter()
+            .find(|r| r.sub_phase == SubPhase::ReleaseReady.code())
+            .expect("it was released by the recovery");
+        let rim = end
+            .world
+            .body(BASKET)
+            .map_or(0.0, |b| b.position_m[2] + b.half_extent_m[2]);
+        assert!(released.target_position_m[2] - 0.04 < rim, "{profile}");
+    }
+}
+
+#[test]
+fn a_policy_that_dies_and_comes_back_is_waited_for() {
+    for (profile, params) in profiles() {
+        let mut session = session(params, &Scene::can_to_plate(), Behaviour::Competent);
+        session.run_until(30, |_| false);
+        session.policy.restart();
+        assert!(session.run(STEPS), "{profile}\n{}", decisions(&session));
+        let stopped = session.events.iter().any(|e| e.mode == Mode::Stop.code());
+        assert!(!stopped, "{profile}");
+    }
 }
