@@ -21,15 +21,16 @@ pub fn sqrt_pos(x: f64) -> f64 {
     root(x.max(0.0))
 }
 
+/// Angles taken at once.
+const LANES: usize = 2;
 /// 2/pi.
 const TWO_OVER_PI: f64 = core::f64::consts::FRAC_2_PI;
 /// Adding and subtracting 1.5 * 2^52 rounds to the nearest integer, ties to even.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
-// pi/2 in three parts. The first two have 33 significant bits, so that `n * part` is exact for
-// |n| < 2^20; together they hold 118 bits (FreeBSD msun, e_rem_pio2.c, public constants).
+// pi/2 in two parts. The first has 33 significant bits, so that `n * PIO2_1` is exact for
+// |n| < 2^20; the second is the rest (FreeBSD msun, e_rem_pio2.c, public constants).
 const PIO2_1: f64 = 1.570_796_326_734_125_6;
-const PIO2_2: f64 = 6.077_100_506_303_966e-11;
-const PIO2_3: f64 = 2.022_266_248_795_950_6e-21;
+const PIO2_1T: f64 = 6.077_100_506_506_192e-11;
 /// Largest magnitude that the short argument reduction serves; beyond it `libm` is called.
 pub(crate) const SHORT_REDUCTION_MAX: f64 = 1.0e6;
 
@@ -47,29 +48,55 @@ const C4: f64 = -2.755_731_435_139_066_3e-7;
 const C5: f64 = 2.087_572_321_298_175e-9;
 const C6: f64 = -1.135_964_755_778_819_5e-11;
 
+/// Applies `f` to every lane.
+#[inline(always)]
+fn lanes<const L: usize>(f: impl Fn(usize) -> f64) -> [f64; L] {
+    let mut out = [0.0; L];
+    for (l, x) in out.iter_mut().enumerate() {
+        *x = f(l);
+    }
+    out
+}
+
+/// Sines and cosines of `L` angles in radians, each of at most [`SHORT_REDUCTION_MAX`]. Written
+/// step by step over all lanes, so that the processor's vectors take several at once.
+#[inline(always)]
+fn sincos_lanes<const L: usize>(x: [f64; L]) -> ([f64; L], [f64; L]) {
+    let shifted: [f64; L] = lanes(|l| x[l] * TWO_OVER_PI + ROUNDER);
+    let n: [f64; L] = lanes(|l| shifted[l] - ROUNDER);
+    let r: [f64; L] = lanes(|l| (x[l] - n[l] * PIO2_1) - n[l] * PIO2_1T);
+    let z: [f64; L] = lanes(|l| r[l] * r[l]);
+    let w: [f64; L] = lanes(|l| z[l] * z[l]);
+    let s: [f64; L] = lanes(|l| {
+        let (z, w) = (z[l], w[l]);
+        let tail = (S1 + z * S2) + w * ((S3 + z * S4) + w * (S5 + z * S6));
+        r[l] + (z * r[l]) * tail
+    });
+    let c: [f64; L] = lanes(|l| {
+        let (z, w) = (z[l], w[l]);
+        let tail = (C1 + z * C2) + w * ((C3 + z * C4) + w * (C5 + z * C6));
+        1.0 - (0.5 * z - w * tail)
+    });
+    // The integer sits in the low bits of the significand. Odd quadrants exchange sine and
+    // cosine; the signs follow bit 1 of n and of n + 1.
+    let (mut sines, mut cosines) = ([0.0; L], [0.0; L]);
+    for l in 0..L {
+        let quadrant = shifted[l].to_bits();
+        let swap = (quadrant & 1).wrapping_neg();
+        let mix = (s[l].to_bits() ^ c[l].to_bits()) & swap;
+        let sin_sign = (quadrant & 2) << 62;
+        let cos_sign = (quadrant.wrapping_add(1) & 2) << 62;
+        sines[l] = f64::from_bits((s[l].to_bits() ^ mix) ^ sin_sign);
+        cosines[l] = f64::from_bits((c[l].to_bits() ^ mix) ^ cos_sign);
+    }
+    (sines, cosines)
+}
+
 /// Sine and cosine of an angle in radians, for |x| up to [`SHORT_REDUCTION_MAX`].
 #[inline(always)]
 fn sincos_short(x: f64) -> (f64, f64) {
-    let shifted = x * TWO_OVER_PI + ROUNDER;
-    // The integer sits in the low bits of the significand.
-    let quadrant = shifted.to_bits();
-    let n = shifted - ROUNDER;
-    let r = ((x - n * PIO2_1) - n * PIO2_2) - n * PIO2_3;
-    let z = r * r;
-    let w = z * z;
-    let sin_tail = (S1 + z * S2) + w * ((S3 + z * S4) + w * (S5 + z * S6));
-    let s = r + (z * r) * sin_tail;
-    let cos_tail = (C1 + z * C2) + w * ((C3 + z * C4) + w * (C5 + z * C6));
-    let c = 1.0 - (0.5 * z - w * cos_tail);
-    // Odd quadrants exchange sine and cosine; the signs follow bit 1 of n and of n + 1.
-    let swap = (quadrant & 1).wrapping_neg();
-    let mix = (s.to_bits() ^ c.to_bits()) & swap;
-    let sin_sign = (quadrant & 2) << 62;
-    let cos_sign = (quadrant.wrapping_add(1) & 2) << 62;
-    (
-        f64::from_bits((s.to_bits() ^ mix) ^ sin_sign),
-        f64::from_bits((c.to_bits() ^ mix) ^ cos_sign),
-    )
+    let ([s], [c]) = sincos_lanes([x]);
+    (s, c)
 }
 
 /// Sine and cosine of an angle in radians, in this order.
@@ -90,7 +117,13 @@ pub fn sincos(x: f64) -> (f64, f64) {
 pub(crate) fn sincos_each_short<const N: usize>(angles: &[f64; N]) -> ([f64; N], [f64; N]) {
     let mut sines = [0.0; N];
     let mut cosines = [0.0; N];
-    for ((x, s), c) in angles.iter().zip(&mut sines).zip(&mut cosines) {
+    let (pairs, rest) = angles.as_chunks();
+    let (sine_pairs, sine_rest) = sines.as_chunks_mut();
+    let (cosine_pairs, cosine_rest) = cosines.as_chunks_mut();
+    for ((x, s), c) in pairs.iter().zip(sine_pairs).zip(cosine_pairs) {
+        (*s, *c) = sincos_lanes::<LANES>(*x);
+    }
+    for ((x, s), c) in rest.iter().zip(sine_rest).zip(cosine_rest) {
         (*s, *c) = sincos_short(*x);
     }
     (sines, cosines)

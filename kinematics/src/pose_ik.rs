@@ -15,7 +15,7 @@ use crate::vector::{distance, norm};
 pub struct Search {
     /// Steps from one start, each a forward kinematics and a 6 by 6 system. Default 100.
     pub steps: u16,
-    /// Starts after the seed. Default 16.
+    /// Starts after the seed. Default 32.
     pub restarts: u16,
     /// Accepted distance in metres. Default 1e-6.
     pub position_tolerance_m: f64,
@@ -27,7 +27,7 @@ impl Default for Search {
     fn default() -> Self {
         Self {
             steps: 100,
-            restarts: 16,
+            restarts: 32,
             position_tolerance_m: 1e-6,
             rotation_tolerance_rad: 1e-6,
         }

@@ -219,19 +219,18 @@ impl<const N: usize> Chain<N> {
     #[inline]
     pub fn solve(&self, q: &[f64; N]) -> Result<Solution<N>, JointOutOfRange> {
         check(q)?;
-        let mut axes = [([0.0; 3], [0.0; 3]); N];
-        let tip = self.walk(q, |index, origin, after| {
-            if let Some(slot) = axes.get_mut(index) {
-                *slot = (after.z, origin);
+        let mut jacobian = Jacobian::zero();
+        // Origin and axis first; the tip, and with it the velocity, is known only at the end.
+        let tip = self.walk(q, |index, [x, y, z], after| {
+            if let Some(column) = jacobian.columns.get_mut(index) {
+                *column = [x, y, z, after.z[0], after.z[1], after.z[2]];
             }
         });
-        let mut jacobian = Jacobian::zero();
-        let columns = jacobian.columns.iter_mut();
-        for ((column, (axis, origin)), stage) in columns.zip(&axes).zip(&self.stages) {
-            let [wx, wy, wz] = *axis;
+        for (column, stage) in jacobian.columns.iter_mut().zip(&self.stages) {
+            let [x, y, z, wx, wy, wz] = *column;
             *column = match stage.kind {
                 JointKind::Revolute => {
-                    let [vx, vy, vz] = cross(*axis, sub(tip.p, *origin));
+                    let [vx, vy, vz] = cross([wx, wy, wz], sub(tip.p, [x, y, z]));
                     [vx, vy, vz, wx, wy, wz]
                 }
                 JointKind::Prismatic => [wx, wy, wz, 0.0, 0.0, 0.0],
