@@ -11,6 +11,7 @@ pub mod diff_ik;
 pub mod elementary;
 pub mod jacobian;
 mod linear;
+pub mod object;
 pub mod otg;
 pub mod panda;
 pub mod pose;
