@@ -1,9 +1,10 @@
 //! An episode: a task of a suite, a scene drawn by a seed, what was changed.
 
+use anyhow::bail;
 use sim_harness::{
     predicate::Goal,
     scene::Scene,
-    suite::{Suite, Task},
+    suite::{Displacement, Suite, Task},
 };
 
 use crate::exit::BadInput;
@@ -61,7 +62,7 @@ impl Args {
         let mut scene = suite.sample_scene(&task, self.seed)?;
         match self.perturbation {
             Perturbation::None => {}
-            Perturbation::Pos => scene.swap_places(&task.target, &task.swap)?,
+            Perturbation::Pos => displace(&task.pos, &mut scene)?,
         }
         let goal = task.goal(&scene)?;
         Ok(Episode {
@@ -70,6 +71,14 @@ impl Args {
             scene,
             goal,
         })
+    }
+}
+
+/// Moves a thing as the task's Pos perturbation says.
+fn displace(pos: &Displacement, scene: &mut Scene) -> anyhow::Result<()> {
+    match &pos.with {
+        Some(other) => Ok(scene.swap_places(&pos.object, other)?),
+        None => bail!("the task's Pos perturbation is no exchange of places"),
     }
 }
 

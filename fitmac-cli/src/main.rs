@@ -6,6 +6,7 @@
 
 mod card;
 mod cmd;
+mod config;
 mod crew;
 mod episode;
 mod exit;
@@ -47,6 +48,10 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Run planner and grounder.
+    Agents(cmd::agents::Args),
+    /// Print the parameters, check a file, print the reference.
+    Config(cmd::config::Args),
     /// A policy fails, then FIT-MAC saves it: four processes, real time.
     Demo(cmd::demo::Args),
     /// Say what of the real-time set-up is missing and how to get it.
@@ -72,6 +77,8 @@ fn run(cli: Cli) -> anyhow::Result<Exit> {
         end_with(supervisor)?;
     }
     match cli.command {
+        Command::Agents(args) => cmd::agents::run(&args),
+        Command::Config(args) => cmd::config::run(&args),
         Command::Demo(args) => cmd::demo::run(&args),
         Command::Doctor(args) => cmd::doctor::run(&args),
         Command::Sim(args) => cmd::sim::run(&args),

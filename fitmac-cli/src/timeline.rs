@@ -35,8 +35,11 @@ pub(crate) struct Row {
 }
 
 /// The decisions of a recorded trace.
-pub(crate) fn read_decisions(_trace: &std::path::Path) -> anyhow::Result<Vec<TraceRecord>> {
-    Ok(Vec::new())
+pub(crate) fn read_decisions(trace: &std::path::Path) -> anyhow::Result<Vec<TraceRecord>> {
+    anyhow::bail!(
+        "{} cannot be read: this build has no trace reader",
+        trace.display()
+    )
 }
 
 /// The rows of an episode: its first query, each one that differs from the row
@@ -61,13 +64,18 @@ pub(crate) fn rows(records: &[TraceRecord], names: &Names) -> Vec<Row> {
         .collect()
 }
 
-/// What makes a row news. Progress comes and goes by the step and is none.
+/// What makes a row news. Progress comes and goes by the step and is none; nor
+/// is evidence while a correction runs, which acts on its own.
 fn key(record: &TraceRecord) -> impl PartialEq + use<> {
+    let evidence = match Route::try_from(record.route) {
+        Ok(Route::Pending) => 0,
+        _ => record.evidence & !evidence::PROGRESS,
+    };
     (
         (record.kind, record.phase, record.diagnosis, record.route),
-        (record.mode, record.sub_phase, record.verdict),
+        (record.mode, record.sub_phase, record.verdict, record.lifted),
         (record.target, record.epoch, record.subtask),
-        record.evidence & !evidence::PROGRESS,
+        evidence,
     )
 }
 
@@ -118,15 +126,14 @@ fn event(before: Option<&TraceRecord>, record: &TraceRecord, names: &Names) -> S
     } else if record.target == 0 {
         "no target".to_owned()
     } else {
-        format!(
-            "target is {}, confidence {:.2}",
-            name(record.target, names),
-            record.kappa
-        )
+        format!("target is {}", name(record.target, names))
     };
     let lifted = before.is_some_and(|before| before.lifted == 0) && record.lifted == 1;
+    let said_before = before.map_or(Verdict::Unknown.code(), |before| before.verdict);
     let verdict = match Verdict::try_from(record.verdict) {
-        Ok(Verdict::Unknown) => String::new(),
+        _ if record.verdict == said_before => String::new(),
+        // Until something was lifted there is nothing to judge.
+        Ok(Verdict::Fail) if before.is_none_or(|before| before.lifted == 0) => String::new(),
         _ => format!("verifier: {}", words::<Verdict>(record.verdict)),
     };
     let failures = evidence::names(record.evidence & !evidence::PROGRESS);
@@ -177,7 +184,11 @@ fn state(record: &TraceRecord, names: &Names) -> String {
     };
     let lock = match record.target {
         0 => "no lock".to_owned(),
-        target => format!("locked on {}", name(target, names)),
+        target => format!(
+            "locked on {}, kappa {:.2}",
+            name(target, names),
+            record.kappa
+        ),
     };
     let streak = match record.failure_streak {
         0 => String::new(),

@@ -16,9 +16,6 @@ use crate::{
 /// Makes sure that the environment fits the pinned requirements.
 pub(crate) fn install(workspace: &Workspace) -> anyhow::Result<()> {
     let requirements = workspace.oracle_requirements();
-    if !requirements.exists() {
-        return Ok(()); // no oracle is in use
-    }
     let wanted = fs::read_to_string(&requirements)
         .with_context(|| format!("{} cannot be read", requirements.display()))?;
     let environment = workspace.oracle_environment();

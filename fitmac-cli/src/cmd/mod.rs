@@ -1,5 +1,7 @@
 //! The commands, one a file.
 
+pub(crate) mod agents;
+pub(crate) mod config;
 pub(crate) mod demo;
 pub(crate) mod doctor;
 pub(crate) mod sim;

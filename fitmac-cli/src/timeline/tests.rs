@@ -83,21 +83,28 @@ fn a_row_tells_what_table_19_tells() {
     let rows = rows(&episode(), &names());
     let first = &rows[0];
     assert_eq!((first.step, &*first.phase), (10, "Pick approach"));
-    assert_eq!(first.event, "target is milk_1, confidence 0.95");
+    assert_eq!(first.event, "target is milk_1");
     assert_eq!(first.decision, "none; base");
-    assert_eq!(first.state, "locked on milk_1");
+    assert_eq!(first.state, "locked on milk_1, kappa 0.95");
     let wrong = &rows[1];
     assert_eq!(wrong.event, "wrong target; at ketchup_1");
     assert_eq!(wrong.decision, "pick failure; execution correction");
     assert_eq!(
         wrong.state,
-        "approach hover, budget 59; locked on milk_1; strong evidence"
+        "approach hover, budget 59; locked on milk_1, kappa 0.95; strong evidence"
     );
     let carried = &rows[3];
     assert_eq!(
         (&*carried.phase, &*carried.event),
         ("Place transport", "target lifted")
     );
+}
+
+#[test]
+fn evidence_while_a_correction_runs_is_no_news() {
+    let mut records = episode();
+    records[6].evidence |= evidence::STALL;
+    assert_eq!(rows(&records, &names()), rows(&episode(), &names()));
 }
 
 #[test]
@@ -108,7 +115,7 @@ fn what_is_unknown_is_shown_as_such() {
     let row = &rows(&[odd], &names())[0];
     assert_eq!(
         (&*row.phase, &*row.state),
-        ("unknown 99", "locked on object 7")
+        ("unknown 99", "locked on object 7, kappa 0.95")
     );
     assert!(rows(&[], &names()).is_empty());
 }

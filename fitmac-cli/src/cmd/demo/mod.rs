@@ -98,9 +98,12 @@ fn plan(args: &Args) -> anyhow::Result<Plan> {
             "{out} cannot be written ({error}): choose another --out"
         ))
     })?;
+    let other = task.pos.with.as_deref().unwrap_or("nothing");
     eprintln!(
-        "Task: {} ({} has changed places with {})",
-        task.instruction, task.target, task.swap
+        "Task: {}. The {} has changed places with the {}.",
+        task.instruction,
+        task.target.replace('_', " "),
+        other.replace('_', " ")
     );
     Ok(Plan {
         seed: args.seed,

@@ -79,7 +79,7 @@ impl Film {
 
     /// A moment that has come and was not taken yet, with its title.
     fn news(&self, plant: &mut Plant) -> Option<(Moment, String)> {
-        let corrects = plant.progress().route.ends_with("correction");
+        let corrects = plant.corrects();
         let wrong = plant.lifted().filter(|&id| id != plant.target());
         let carried = plant.target_risen_m() > CARRIED_M;
         let (moment, title) = if !self.has(Moment::Before) {
@@ -102,7 +102,7 @@ impl Film {
             (Moment::Failure, format!("failure: lifts {name}"))
         } else if corrects && !self.has(Moment::Failure) {
             (Moment::Failure, "failure detected".to_owned())
-        } else if carried && corrects {
+        } else if carried && self.has(Moment::Failure) && wrong.is_none() {
             (Moment::Recovery, "recovery".to_owned())
         } else {
             return None;

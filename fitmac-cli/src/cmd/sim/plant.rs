@@ -96,8 +96,7 @@ impl Plant {
         if starts_action {
             self.sim.apply(&command.action)?;
             self.steps += 1;
-            let replaced = matches!(command.route(), Some(Route::Execution | Route::Pending));
-            self.replaced_steps += u64::from(replaced);
+            self.replaced_steps += u64::from(is_correction(&command));
         }
         self.command = Some(command);
         Ok(())
@@ -230,6 +229,11 @@ impl Plant {
         }
     }
 
+    /// Whether a correction has the arm.
+    pub(super) fn corrects(&self) -> bool {
+        self.command.as_ref().is_some_and(is_correction)
+    }
+
     /// Distance between the finger pads, m.
     pub(super) fn gripper_width_m(&self) -> f64 {
         self.sample.gripper_width_m
@@ -270,6 +274,11 @@ impl Plant {
             pictures,
         }
     }
+}
+
+/// Whether a correction, not the policy, decided the command.
+fn is_correction(command: &Command) -> bool {
+    matches!(command.route(), Some(Route::Execution | Route::Pending))
 }
 
 /// The same class as the core names it.
