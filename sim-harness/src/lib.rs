@@ -9,13 +9,16 @@
 //! pads, 0.1034 m beyond the hand's flange.
 
 pub mod action;
+pub mod agents;
 pub mod backbone;
 pub mod error;
 mod geometry;
 pub mod grasp;
+pub mod lockstep;
 pub mod object;
 pub mod osc;
 pub mod panda;
+pub mod perception;
 pub mod picture;
 pub mod plot;
 pub mod pose;

@@ -95,6 +95,9 @@ pub struct ObjectKind {
     /// Whether it is bolted down: furniture.
     #[serde(default)]
     pub fixed: bool,
+    /// Label of the piece of furniture that it is a part of.
+    #[serde(default)]
+    pub part_of: Option<String>,
     /// Red, green, blue, 0 to 1.
     pub colour: [f32; 3],
 }

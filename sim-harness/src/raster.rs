@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::sim::{Owner, Sim};
+use crate::sim::{Owner, RobotState, Sim};
 
 /// Where the light comes from, base frame.
 const LIGHT: [f64; 3] = [0.35, 0.45, 0.82];
@@ -32,6 +32,18 @@ impl Camera {
             position_m: [1.35, 0.0, 0.78 + surface_m],
             look_at_m: [0.38, 0.0, 0.10 + surface_m],
             fov_y_rad: 0.78,
+        }
+    }
+
+    /// At the robot's wrist, looking along the fingers, like LIBERO's `eye_in_hand`.
+    #[must_use]
+    pub fn wrist(robot: &RobotState) -> Self {
+        let hand = robot.tcp.isometry();
+        let at = |x: f64, z: f64| (hand * nalgebra::Point3::new(x, 0.0, z)).into();
+        Self {
+            position_m: at(0.06, -0.12),
+            look_at_m: at(0.02, 0.0),
+            fov_y_rad: 1.3,
         }
     }
 
@@ -173,4 +185,23 @@ pub fn mask(sim: &mut Sim, camera: &Camera, width: usize, height: usize) -> Mask
         owner,
         range_m,
     }
+}
+
+/// What a ray from `eye_m` towards each target meets first. The point of view may be anywhere; no
+/// picture is taken.
+pub(crate) fn first_hits(
+    sim: &mut Sim,
+    eye_m: [f64; 3],
+    targets_m: &[[f64; 3]],
+) -> Vec<Option<Owner>> {
+    let rays: Vec<[f64; 3]> = targets_m
+        .iter()
+        .map(|t| std::array::from_fn(|i| t[i] - eye_m[i]))
+        .collect();
+    let (data, owners) = sim.rays();
+    let (geoms, _) = data.multi_ray(&eye_m, &rays, None, true, None, FAR_M, None);
+    geoms
+        .iter()
+        .map(|g| g.and_then(|g| owners.get(g).copied()))
+        .collect()
 }

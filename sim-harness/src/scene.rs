@@ -11,6 +11,10 @@ use crate::pose::Pose;
 
 /// Most objects of a scene: the capacity of a state sample.
 pub const MAX_OBJECTS: usize = 32;
+/// Centre of the working surface, base frame, m.
+pub const TABLE_CENTRE_M: [f64; 2] = [0.5, 0.0];
+/// Half extent of the working surface, m.
+pub const TABLE_HALF_M: [f64; 2] = [0.4, 0.55];
 /// How far above its support an object is put down, m, so that nothing starts in contact.
 const CLEARANCE_M: f64 = 0.001;
 
@@ -211,6 +215,21 @@ impl Scene {
         Ok(())
     }
 
+    /// Puts an object that is already in the scene on top of another one, centred.
+    ///
+    /// # Errors
+    /// [`SimError::Unknown`] if one of them does not exist.
+    pub fn move_onto(&mut self, name: &str, support: &str) -> Result<(), SimError> {
+        let below = self.by_name(support)?;
+        let [x, y, z] = below.pose.position_m;
+        let top = z + below.kind.support_m();
+        let index = usize::from(self.by_name(name)?.id) - 1;
+        let object = &mut self.objects[index];
+        let z = top + object.kind.half_extent_m()[2] + CLEARANCE_M;
+        object.pose.position_m = [x, y, z];
+        Ok(())
+    }
+
     /// The scene as MJCF; it includes the robot as `panda.xml`.
     pub(crate) fn to_mjcf(&self) -> String {
         let Arena {
@@ -219,6 +238,7 @@ impl Scene {
             floor_colour: [fr, fg, fb],
             ..
         } = &self.arena;
+        let ([tx, ty], [hx, hy]) = (TABLE_CENTRE_M, TABLE_HALF_M);
         let floor_m = surface_m - 0.4;
         let top_m = surface_m - 0.02;
         let mut bodies = String::new();
@@ -255,8 +275,8 @@ impl Scene {
 </default>
 <worldbody>
 <geom class="visual" name="floor" type="plane" size="4 4 0.1" pos="0 0 {floor_m}" rgba="{fr} {fg} {fb} 1"/>
-<geom class="world" name="surface" type="plane" size="0.4 0.55 0.1" pos="0.45 0 {surface_m}" rgba="{r} {g} {b} 1"/>
-<geom class="visual" name="table" type="box" size="0.4 0.55 0.0195" pos="0.45 0 {top_m}" rgba="{r} {g} {b} 1"/>
+<geom class="world" name="surface" type="plane" size="{hx} {hy} 0.1" pos="{tx} {ty} {surface_m}" rgba="{r} {g} {b} 1"/>
+<geom class="visual" name="table" type="box" size="{hx} {hy} 0.0195" pos="{tx} {ty} {top_m}" rgba="{r} {g} {b} 1"/>
 {bodies}</worldbody>
 </mujoco>
 "#

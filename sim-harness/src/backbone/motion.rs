@@ -37,6 +37,17 @@ impl PointMass {
         }
     }
 
+    /// The state after the arm was left alone for `wait_s` with its last goal: it comes to rest.
+    #[must_use]
+    pub fn coasting(&self, wait_s: f64) -> Self {
+        let rate = libm::sqrt(Gains::default().stiffness);
+        let decay = libm::exp(-rate * wait_s);
+        Self {
+            position_m: self.position_m + self.velocity_m_s * ((1.0 - decay) / rate),
+            velocity_m_s: self.velocity_m_s * decay,
+        }
+    }
+
     /// The translation that leads to a waypoint without passing it, no longer than `speed`.
     #[must_use]
     pub fn towards(&self, waypoint_m: Vector3<f64>, speed: f64) -> Vector3<f64> {

@@ -189,7 +189,9 @@ impl Backbone for Replay {
         let mut mass = PointMass {
             position_m: robot.tcp.position_m.into(),
             velocity_m_s: robot.tcp_velocity_m_s.into(),
-        };
+        }
+        // The answer comes late; so it did when the demonstrations were made.
+        .coasting(self.params.latency_s);
         let [w, x, y, z] = robot.tcp.orientation;
         let now = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
         // The tilt is corrected over the chunk's first steps, not all at once.
