@@ -30,13 +30,24 @@ pub struct Attempt {
     id: u64,
     steps: u32,
     hand: Hand,
-    wrong_target_steps: u32,
-    last_other: Option<(ObjectId, f64)>,
+    wrong_approach: Option<WrongApproach>,
     lowering_steps: u32,
     rest_steps: u32,
     held_other: Option<Held>,
     latched: u64,
 }
+
+/// Another instance than the target that is approached.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct WrongApproach {
+    id: ObjectId,
+    nearest_m: f64,
+    steps: u32,
+}
+
+/// Growth of the distance over its least that ends an approach, m: more than
+/// the noise of a pose, less than a change of mind.
+const RECEDING_M: f64 = 0.02;
 
 /// An object, not the target, that seems to be in the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,8 +66,7 @@ impl Attempt {
             id,
             steps: 0,
             hand: Hand::Unseen,
-            wrong_target_steps: 0,
-            last_other: None,
+            wrong_approach: None,
             lowering_steps: 0,
             rest_steps: 0,
             held_other: None,
@@ -149,22 +159,21 @@ impl Attempt {
     /// Another instance is nearer than the lock, near, and not receding.
     fn watch_approach(&mut self, params: &EvidenceParams, signals: &Signals) -> u64 {
         let (Some(target), Some(other)) = (&signals.target, &signals.other) else {
-            self.wrong_target_steps = 0;
-            self.last_other = None;
+            self.wrong_approach = None;
             return 0;
         };
-        let closing = self
-            .last_other
-            .is_some_and(|(id, before)| id == other.id && other.distance_m < before + 0.001);
-        self.last_other = Some((other.id, other.distance_m));
         let nearer = other.distance_m < target.distance_m - params.wrong_target_margin_m
             && other.distance_m < params.wrong_target_distance_m;
-        self.wrong_target_steps = if nearer && closing {
-            self.wrong_target_steps.saturating_add(1)
-        } else {
-            0
-        };
-        if self.wrong_target_steps >= params.wrong_target_steps {
+        let before = self
+            .wrong_approach
+            .filter(|a| a.id == other.id && other.distance_m < a.nearest_m + RECEDING_M);
+        let approach = nearer.then(|| WrongApproach {
+            id: other.id,
+            nearest_m: before.map_or(other.distance_m, |a| a.nearest_m.min(other.distance_m)),
+            steps: before.map_or(0, |a| a.steps).saturating_add(1),
+        });
+        self.wrong_approach = approach;
+        if approach.is_some_and(|a| a.steps >= params.wrong_target_steps) {
             evidence::WRONG_TARGET
         } else {
             0

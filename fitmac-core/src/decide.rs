@@ -226,6 +226,10 @@ fn correct_target(
     let waited_ns = match subtask.rebind {
         Rebind::Asked { since_ns } => now_ns.saturating_sub(since_ns),
         Rebind::Unanswered => return (Decided::Policy, reasons | reason::AWAITING_REBIND, false),
+        // Nothing was found, twice: act without, and wait to be told.
+        Rebind::Idle if !subtask.may_ask(params) => {
+            return (Decided::Policy, reasons | reason::BUDGET_SPENT, false);
+        }
         Rebind::Idle => {
             subtask.ask_rebind(now_ns);
             let hold = params.while_rebinding == WhileRebinding::Hold && !params.switches.none();

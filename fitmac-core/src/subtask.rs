@@ -225,7 +225,7 @@ impl Subtask {
                 .is_some_and(|n| n < params.gate.cool_down_steps),
             budget: self.recovery.activations() < params.gate.activations
                 && episode_left(&params.recovery, episode_queries) > 0,
-            rebinds: self.rebinds < params.lock.rebinds || self.rebind != Rebind::Idle,
+            rebinds: self.may_ask(params) || self.rebind != Rebind::Idle,
             plan_certain: plan_confidence >= params.gate.plan_confidence,
             routine: self.routine(params),
         };
@@ -246,7 +246,12 @@ impl Subtask {
         binding.confirmed
             || self.rebind == Rebind::Unanswered
             || !params.switches.target_corrector
-            || self.rebinds >= params.lock.rebinds
+            || (self.rebind == Rebind::Idle && !self.may_ask(params))
+    }
+
+    /// Requests to the agents are left.
+    pub(crate) const fn may_ask(&self, params: &Params) -> bool {
+        self.rebinds < params.lock.rebinds
     }
 
     /// What an execution correction would run now.

@@ -194,10 +194,38 @@ fn an_approach_to_another_object_doubts_the_binding_before_it_doubts_the_executi
             "{profile}\n{}",
             decisions(&end)
         );
-        assert!(
-            end.rebinds >= 2,
+        assert_eq!(
+            end.rebinds, 2,
             "{profile}: it was asked for, and asked again"
         );
+        let epoch = end.controller.state().subtask().lock().epoch();
+        assert_eq!(
+            epoch,
+            2,
+            "{profile}: the answer was used\n{}",
+            decisions(&end)
+        );
+    }
+}
+
+#[test]
+fn agents_that_find_nothing_are_asked_twice_and_then_heard_when_they_speak() {
+    for (profile, params) in profiles() {
+        let nothing = Answer::Target {
+            id: 0,
+            kappa: 0.0,
+            provenance: Provenance::Rules,
+        };
+        let scene = Scene::can_to_plate();
+        let policy = Policy::new(Behaviour::Frozen);
+        let mut session = Session::new(params, scene, policy, Agent::new([nothing]));
+        session.run_until(60, |_| false);
+        assert_eq!(session.rebinds, 2, "{profile}\n{}", decisions(&session));
+        session
+            .agent
+            .volunteer(session.world.now_ns(), CAN, &session.scene);
+        assert!(session.run(STEPS), "{profile}\n{}", decisions(&session));
+        assert_eq!(session.rebinds, 2);
     }
 }
 

@@ -104,6 +104,22 @@ impl Agent {
         }
     }
 
+    /// Names a target without being asked.
+    pub fn volunteer(&mut self, now_ns: u64, id: ObjectId, scene: &Scene) {
+        let epoch = self.last.map_or(0, |r| r.epoch);
+        let request = RebindRequest {
+            request_id: 0,
+            stamp_ns: now_ns,
+            epoch,
+            subtask: 0,
+            suspect: 0,
+            reserved: 0,
+            reasons: 0,
+        };
+        let record = self.record(now_ns, &request, scene, id, 0.9, Provenance::Resolver);
+        self.due = Some((now_ns, record));
+    }
+
     fn record(
         &mut self,
         now_ns: u64,

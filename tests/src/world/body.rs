@@ -33,7 +33,7 @@ pub struct Body {
 }
 
 /// Thickness of a bowl's rim between the fingers, m.
-const RIM_M: f64 = 0.014;
+const RIM_M: f64 = 0.005;
 /// Thickness of a container's floor, m.
 const FLOOR_M: f64 = 0.005;
 

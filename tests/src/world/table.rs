@@ -8,8 +8,8 @@ use fitmac_core::{
 };
 
 /// The heading of the table.
-pub const HEADING: &str = "query step  phase       evidence                       \
-diagnosis and route                           controller state";
+pub const HEADING: &str = "Query Step  Phase       Event / evidence               \
+Diagnosis and route                           Controller state";
 
 /// One line of the table.
 #[must_use]
@@ -67,6 +67,7 @@ pub fn changes(records: &[TraceRecord]) -> Vec<&TraceRecord> {
             r.diagnosis,
             r.route,
             r.sub_phase,
+            r.epoch,
             r.evidence & !evidence::PROGRESS,
         )
     };
@@ -77,4 +78,12 @@ pub fn changes(records: &[TraceRecord]) -> Vec<&TraceRecord> {
         }
     }
     rows
+}
+
+/// Prints the rows at which something changes.
+pub fn print(records: &[TraceRecord]) {
+    println!("{HEADING}");
+    for record in changes(records) {
+        println!("{}", row(record));
+    }
 }
