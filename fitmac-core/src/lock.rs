@@ -91,6 +91,15 @@ impl Lock {
         self.binding.map_or(0, |b| b.target)
     }
 
+    /// The destination's anchor, if it is direct.
+    #[must_use]
+    pub fn anchor(&self) -> Option<&Anchor> {
+        match self.binding.as_ref().map(|b| &b.destination) {
+            Some(Destination::Direct(anchor)) => Some(anchor),
+            _ => None,
+        }
+    }
+
     /// Commits a proposal. One without a target leaves the lock open, but its
     /// epoch counts.
     pub(crate) fn commit(&mut self, record: &GroundingRecord) {

@@ -9,9 +9,10 @@ use kinematics::{
 
 use crate::{
     intake::robot,
-    lock::{Anchor, Destination, Lock},
+    lock::{Anchor, Lock},
     message::{ObjectId, ObjectSample, StateSample},
     params::{Grasp, Gripper as GripperParams, Params},
+    tracking::Tracking,
     wire::{GraspClass, PlaceRelation},
 };
 
@@ -71,7 +72,9 @@ impl GripperView {
         };
         let change = width_m - width_before_m;
         let narrow = width_m < p.closed_ratio * p.open_width_m;
-        let state = if change > p.moving_m || (!narrow && !commanded_closed) {
+        // Fingers that give way while they are told to close are not opening.
+        let opening = change > p.moving_m && (!commanded_closed || !narrow);
+        let state = if opening || (!narrow && !commanded_closed) {
             GripperState::Open
         } else if change < -p.moving_m {
             GripperState::Closing
@@ -157,32 +160,32 @@ pub struct Signals {
 pub(crate) struct Memory<'a> {
     pub(crate) lock: &'a Lock,
     pub(crate) gripper: GripperView,
-    /// Where the target sits in the hand, in the hand's frame, m.
-    pub(crate) in_hand_m: Option<Vector3>,
+    pub(crate) tracking: &'a Tracking,
 }
 
 impl Signals {
     pub(crate) fn new(params: &Params, sample: &StateSample, memory: &Memory<'_>) -> Self {
-        let ee_m = sample.ee_position_m;
-        let binding = memory.lock.binding();
-        let target = binding
-            .and_then(|b| robot::object(sample, b.target))
-            .map(|object| target_view(&params.grasp, sample, object, memory.in_hand_m));
-        let destination = match binding.map(|b| b.destination) {
-            Some(Destination::Direct(anchor)) => destination_view(sample, &anchor, target.as_ref()),
+        let lock = memory.lock;
+        let target = robot::object(sample, lock.target()).map(|object| {
+            let position_m = memory
+                .tracking
+                .target_m(sample)
+                .unwrap_or(object.position_m);
+            target_view(&params.grasp, sample, object, position_m)
+        });
+        let destination = match (lock.anchor(), &target) {
+            (Some(anchor), Some(target)) => {
+                destination_view(sample, anchor, memory.tracking.anchor_m(), target)
+            }
             _ => None,
         };
-        let anchor = match binding.map(|b| b.destination) {
-            Some(Destination::Direct(anchor)) => anchor.object,
-            _ => 0,
-        };
-        let other = nearest_other(&params.grasp, sample, memory.lock.target(), anchor);
+        let anchor = lock.anchor().map_or(0, |a| a.object);
         Self {
-            ee_m,
+            ee_m: sample.ee_position_m,
             gripper: memory.gripper,
             target,
             destination,
-            other,
+            other: nearest_other(&params.grasp, sample, lock.target(), anchor),
         }
     }
 }
@@ -204,12 +207,8 @@ fn target_view(
     grasp: &Grasp,
     sample: &StateSample,
     object: &ObjectSample,
-    in_hand: Option<Vector3>,
+    position_m: Vector3,
 ) -> TargetView {
-    let position_m = match in_hand {
-        Some(offset) => hand(sample).transform_point(offset),
-        None => object.position_m,
-    };
     let at = GraspSite {
         position_m,
         ..GraspSite::of(object)
@@ -303,12 +302,15 @@ pub fn half_height(object: &ObjectSample) -> f64 {
 fn destination_view(
     sample: &StateSample,
     anchor: &Anchor,
-    target: Option<&TargetView>,
+    anchor_m: Option<Vector3>,
+    target: &TargetView,
 ) -> Option<DestinationView> {
     let object = robot::object(sample, anchor.object)?;
-    let frame = Pose::new(object.position_m, orientation(object.orientation));
+    let frame = Pose::new(
+        anchor_m.unwrap_or(object.position_m),
+        orientation(object.orientation),
+    );
     let position_m = frame.transform_point(anchor.offset_m);
-    let target = target?;
     let [dx, dy, _] = vector::sub(target.position_m, position_m);
     let clearance_m = target.position_m[2] - target.half_height_m - position_m[2];
     Some(DestinationView {

@@ -121,12 +121,13 @@ impl Subtask {
     ) {
         let gripper = GripperView::new(&params.gripper, sample, width_before_m, commanded_closed);
         let holding = gripper.state == GripperState::Holding;
+        let anchor = self.lock.anchor().map_or(0, |a| a.object);
         self.tracking
-            .step(params, sample, self.lock.target(), holding);
+            .step(params, sample, self.lock.target(), anchor, holding);
         let memory = Memory {
             lock: &self.lock,
             gripper,
-            in_hand_m: self.tracking.in_hand_m(),
+            tracking: &self.tracking,
         };
         let signals = Signals::new(params, sample, &memory);
         match self.estimator.step(&params.phase, &signals) {
@@ -192,7 +193,7 @@ impl Subtask {
         plan_confidence: f64,
         episode_queries: u32,
     ) -> Assessment {
-        let carried = self.tracking.in_hand_m().is_some();
+        let carried = self.tracking.is_carried();
         let kappa = self.lock.kappa(&params.lock, now_ns, Some(sample), carried);
         let rules =
             self.level_bits | self.attempt.latched() | self.lock.evidence(&params.lock, kappa);
@@ -300,14 +301,19 @@ impl Subtask {
         }
     }
 
-    /// A pick recovery with an open hand begins a new attempt, whatever the
-    /// policy's attempt came to.
+    /// A pick recovery begins a new attempt, whatever the policy's attempt came
+    /// to: once its hand is open, and at once if the target had been let go.
     pub(crate) fn follow_recovery(&mut self) {
-        let picking = matches!(
+        let open_handed = matches!(
             self.recovery.sub_phase(),
             SubPhase::ApproachHover | SubPhase::Descend | SubPhase::Reopen
         );
-        if picking && !is_pick(self.estimator.phase()) {
+        let closed = matches!(
+            self.recovery.sub_phase(),
+            SubPhase::Close | SubPhase::LiftTest
+        );
+        let let_go = self.estimator.carry() == Carry::Released;
+        if (open_handed && !is_pick(self.estimator.phase())) || (closed && let_go) {
             self.restart_attempt();
         }
     }
@@ -349,10 +355,7 @@ impl Subtask {
         signals: &'a Signals,
         assessment: &Assessment,
     ) -> Scene<'a> {
-        let anchor = match self.lock.binding().map(|b| b.destination) {
-            Some(Destination::Direct(anchor)) => anchor.object,
-            _ => 0,
-        };
+        let anchor = self.lock.anchor().map_or(0, |a| a.object);
         Scene {
             phase: self.estimator.phase(),
             destination_object: anchor,

@@ -7,7 +7,7 @@ mod stages;
 pub use stage::{ParamInfo, Violation, Violations};
 pub use stages::{
     ActionScale, ChunkIntake, Clock, Evidence, Filter, Gate, Grasp, Gripper, Horizon, Lock,
-    Patience, PhaseParams, Progress, RecoveryParams, Shaping, StateIntake, Timeout,
+    Patience, PhaseParams, Progress, RecoveryParams, Shaping, StateIntake, Timeout, Tracking,
 };
 
 use crate::wire::GripperConvention;
@@ -145,6 +145,8 @@ params! {
     action: ActionScale,
     /// Gripper.
     gripper: Gripper,
+    /// Steadying of object poses.
+    tracking: Tracking,
     /// Phase estimation.
     phase: PhaseParams,
     /// Progress.
@@ -203,6 +205,7 @@ impl Params {
         params.recovery.level_rad = 0.0;
         params.recovery.align_yaw_rad = 0.0;
         params.gate.plan_confidence = 0.0;
+        params.tracking.gain = 1.0;
         params
     }
 

@@ -96,6 +96,16 @@ stage! {
 }
 
 stage! {
+    /// Steadying of object poses.
+    Tracking "tracking" {
+        /// Share of the way to each new observation (1: none is steadied).
+        gain: f64 = 0.35 in 0.01..=1.0, "1";
+        /// A change beyond this is motion, and is taken at once.
+        jump_m: f64 = 0.04 in 0.001..=0.5, "m";
+    }
+}
+
+stage! {
     /// Phase estimation (section 3.4 of the paper names the signals).
     PhaseParams "phase" {
         /// Open and further than this from the target: approach.
