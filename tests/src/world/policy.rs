@@ -39,6 +39,8 @@ pub struct Policy {
     pub horizon: u32,
     /// Time to answer, ns.
     pub delay_ns: u64,
+    /// Share of the action box that its motions use.
+    pub speed: f64,
     session: u64,
     sequence: u64,
     due: Option<(u64, ActionChunk)>,
@@ -59,6 +61,7 @@ impl Policy {
             behaviour,
             horizon: 8,
             delay_ns: 30_000_000,
+            speed: 1.0,
             session: 1,
             sequence: 0,
             due: None,
@@ -138,6 +141,7 @@ impl Policy {
             destination: scene.destination,
             relation: scene.relation,
             behaviour: &self.behaviour,
+            speed: self.speed,
             step: query.policy_step,
         };
         rollout(&task, world.clone(), n)
@@ -151,6 +155,7 @@ struct Task<'a> {
     destination: ObjectId,
     relation: PlaceRelation,
     behaviour: &'a Behaviour,
+    speed: f64,
     step: u64,
 }
 
@@ -167,6 +172,7 @@ fn remember(moved_m: [f64; 2], world: &World, scene: &Scene) -> Vec<Action> {
         destination: scene.destination,
         relation: scene.relation,
         behaviour: &Behaviour::Competent,
+        speed: 1.0,
         step: 0,
     };
     let settle = vec![[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0]; 10];
@@ -213,7 +219,7 @@ fn act(task: &Task<'_>, world: &World) -> Action {
         return place(task, world, destination.position_m);
     }
     if world.is_placed(task.target, task.destination) {
-        return towards(world, [0.45, 0.0, 0.30], -1.0);
+        return towards(task, world, [0.45, 0.0, 0.30], -1.0);
     }
     let half = target.half_extent_m;
     let mut grasp = target.position_m;
@@ -247,7 +253,7 @@ fn pick(task: &Task<'_>, world: &World, grasp_m: Vector3) -> Action {
     if matches!(task.behaviour, Behaviour::StallsAbove(_)) && off < 0.012 && z - gz - above < 0.01 {
         return [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0];
     }
-    towards(world, [gx, gy, gz + above], -1.0)
+    towards(task, world, [gx, gy, gz + above], -1.0)
 }
 
 fn place(task: &Task<'_>, world: &World, destination_m: Vector3) -> Action {
@@ -268,20 +274,20 @@ fn place(task: &Task<'_>, world: &World, destination_m: Vector3) -> Action {
         PlaceRelation::In => gz + 0.04 + hangs,
     };
     if off > 0.02 && z < CARRY_M {
-        return towards(world, [x, y, CARRY_M + 0.05], 1.0);
+        return towards(task, world, [x, y, CARRY_M + 0.05], 1.0);
     }
     if off > 0.02 {
-        return towards(world, [gx, gy, CARRY_M + 0.05], 1.0);
+        return towards(task, world, [gx, gy, CARRY_M + 0.05], 1.0);
     }
     if z > release_z {
-        return towards(world, [gx, gy, release_z - 0.02], 1.0);
+        return towards(task, world, [gx, gy, release_z - 0.02], 1.0);
     }
     [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0]
 }
 
-/// Towards a place, as fast as the action box allows.
-fn towards(world: &World, goal_m: Vector3, grip: f64) -> Action {
+/// Towards a place, as fast as the policy moves.
+fn towards(task: &Task<'_>, world: &World, goal_m: Vector3, grip: f64) -> Action {
     let [dx, dy, dz] = vector::sub(goal_m, world.ee_m());
-    let unit = |d: f64| (d / 0.05).clamp(-1.0, 1.0);
+    let unit = |d: f64| (d / 0.05).clamp(-task.speed, task.speed);
     [unit(dx), unit(dy), unit(dz), 0.0, 0.0, 0.0, grip]
 }

@@ -34,6 +34,8 @@ pub struct Session {
     pub agent: Agent,
     /// The task verifier.
     pub verifier: Verifier,
+    /// Time from an outcome to its report, ns.
+    pub verdict_delay_ns: u64,
     /// Time between control ticks, ns.
     pub tick_ns: u64,
     /// The plan that is sent with the first tick, if any.
@@ -45,6 +47,7 @@ pub struct Session {
     /// Rebind requests so far.
     pub rebinds: usize,
     verdicts: u64,
+    done_since_ns: Option<u64>,
 }
 
 impl Session {
@@ -62,12 +65,14 @@ impl Session {
             policy,
             agent,
             verifier: Verifier::Successes,
+            verdict_delay_ns: 0,
             tick_ns: 4_000_000,
             plan: None,
             queries: Vec::new(),
             events: Vec::new(),
             rebinds: 0,
             verdicts: 0,
+            done_since_ns: None,
         }
     }
 
@@ -109,7 +114,15 @@ impl Session {
     }
 
     fn verdict(&mut self) -> Option<VerifierReport> {
-        let done = self.scene.is_done(&self.world);
+        let now_ns = self.world.now_ns();
+        self.done_since_ns = match self.done_since_ns {
+            _ if !self.scene.is_done(&self.world) => None,
+            None => Some(now_ns),
+            since => since,
+        };
+        let done = self
+            .done_since_ns
+            .is_some_and(|since| now_ns - since >= self.verdict_delay_ns);
         let verdict = match self.verifier {
             Verifier::Absent => return None,
             Verifier::Successes if !done => return None,
