@@ -222,8 +222,8 @@ stage! {
     Lock "lock" {
         /// tau_kappa: below it the binding is uncertain (equation 7; distinct from the gate's threshold, appendix A.5.2).
         kappa_min: f64 = 0.30 in 0.0..=1.0, "1";
-        /// A pose older than this gives no confidence.
-        pose_lost_ms: u32 = 250 in 10..=10000, "ms";
+        /// A pose older than this gives no confidence. (A camera at 10 Hz that answers after 100 ms and misses two frames is 400 ms behind.)
+        pose_lost_ms: u32 = 800 in 10..=10000, "ms";
         /// A jump of the locked pose without contact that is inconsistent.
         jump_m: f64 = 0.10 in 0.01..=1.0, "m";
         /// Weight of the height in the geometric score (lambda_z of equation 4).
@@ -253,7 +253,7 @@ stage! {
         /// Steps after a hand-back before another correction.
         cool_down_steps: u32 = 16 in 0..=1000, "steps";
         /// Execution corrections in one subtask.
-        activations: u32 = 2 in 0..=100, "activations";
+        activations: u32 = 4 in 0..=100, "activations";
         /// Least confidence of the plan's parse for any correction.
         plan_confidence: f64 = 0.5 in 0.0..=1.0, "1";
     }
