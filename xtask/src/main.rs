@@ -52,6 +52,8 @@ enum Command {
     Ci(cmd::ci::Args),
     /// Build and run one benchmark, or list them.
     Bench(cmd::bench::Args),
+    /// Build the C library and install it with its headers and package files.
+    Install(cmd::install::Args),
     /// Say what the machine lacks to build and test.
     Doctor(cmd::doctor::Args),
 }
@@ -65,6 +67,7 @@ fn main() -> ExitCode {
         Command::Test(args) => cmd::test::run(&workspace, &args),
         Command::Ci(args) => cmd::ci::run(&workspace, &args),
         Command::Bench(args) => cmd::bench::run(&workspace, &args),
+        Command::Install(args) => cmd::install::run(&workspace, &args),
         Command::Doctor(args) => cmd::doctor::run(&workspace, &args),
     };
     match result {

@@ -1,9 +1,11 @@
 //! Parameters: declared with range, unit, default and reason; checked once;
 //! immutable afterwards.
 
+mod assign;
 mod stage;
 mod stages;
 
+pub use assign::AssignError;
 pub use stage::{ParamInfo, Violation, Violations};
 pub use stages::{
     ActionScale, ChunkIntake, Clock, Evidence, Filter, Gate, Grasp, Gripper, Horizon, Lock,
@@ -126,6 +128,18 @@ macro_rules! params {
         impl Params {
             /// The tables of all stages, for reference documentation.
             pub const TABLES: &[&[ParamInfo]] = &[$($type::TABLE,)+];
+
+            fn assign_stage(
+                &mut self,
+                stage: &str,
+                name: &str,
+                text: &str,
+            ) -> Result<(), AssignError> {
+                match stage {
+                    $(stringify!($field) => self.$field.assign(name, text),)+
+                    _ => Err(AssignError::UnknownKey),
+                }
+            }
 
             fn check_stages(&self, found: &mut Violations) {
                 $(self.$field.check(found);)+

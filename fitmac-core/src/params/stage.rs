@@ -2,6 +2,8 @@
 //! place, from which the struct, its default, its check and the reference
 //! table are made.
 
+use super::AssignError;
+
 /// One parameter as the reference table shows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParamInfo {
@@ -131,7 +133,7 @@ impl core::fmt::Display for Violations {
 impl core::error::Error for Violations {}
 
 /// A number that a parameter may hold.
-pub(super) trait Number: Copy {
+pub(super) trait Number: Copy + core::str::FromStr {
     fn as_f64(self) -> f64;
 }
 
@@ -145,6 +147,12 @@ impl Number for u32 {
     fn as_f64(self) -> f64 {
         f64::from(self)
     }
+}
+
+/// Puts the number that `text` says into `slot`.
+pub(super) fn assign_number<T: Number>(slot: &mut T, text: &str) -> Result<(), AssignError> {
+    *slot = text.parse().map_err(|_| AssignError::NotAValue)?;
+    Ok(())
 }
 
 /// Declares the parameters of a stage.
@@ -179,6 +187,19 @@ macro_rules! stage {
                 max: $max as f64,
                 doc: concat!($($doc,)+),
             },)+];
+
+            pub(super) fn assign(
+                &mut self,
+                name: &str,
+                text: &str,
+            ) -> Result<(), $crate::params::AssignError> {
+                match name {
+                    $(stringify!($field) => {
+                        $crate::params::stage::assign_number(&mut self.$field, text)
+                    })+
+                    _ => Err($crate::params::AssignError::UnknownKey),
+                }
+            }
 
             pub(super) fn check(&self, found: &mut $crate::params::Violations) {
                 $(
