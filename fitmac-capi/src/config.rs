@@ -11,7 +11,7 @@ use fitmac_core::{ValidParams, params::Params};
 use crate::{
     file,
     memory::{ALIGNMENT, Stamp, TextOut, assert_alignment, checked, room, text},
-    status::{Outcome, Status, answer},
+    status::{Outcome, Status, run},
 };
 
 const MAGIC: u64 = u64::from_le_bytes(*b"FITMAC-P");
@@ -95,7 +95,7 @@ pub unsafe extern "C" fn fitmac_config_init(
         }
         Ok(())
     };
-    answer(make())
+    run(make)
 }
 
 /// Sets one parameter: `key` like "gate.failure_streak", `value` like "3",
@@ -120,7 +120,7 @@ pub unsafe extern "C" fn fitmac_config_set(
             .assign(key, value)
             .map_err(file::refused)
     };
-    answer(set())
+    run(set)
 }
 
 /// Reads the text of a configuration file: `profile = "paper"`, `[gate]`,
@@ -138,7 +138,7 @@ pub unsafe extern "C" fn fitmac_config_parse(
     line: *mut u32,
 ) -> Status {
     let mut at = 0;
-    let mut parse = || {
+    let parse = || {
         // SAFETY: promised.
         let config = unsafe { Config::read(config)? }.cast_mut();
         let text = checked(text.cast::<u8>())?;
@@ -155,12 +155,12 @@ pub unsafe extern "C" fn fitmac_config_parse(
         *place = params;
         Ok(())
     };
-    let outcome = parse();
+    let status = run(parse);
     if let Ok(line) = checked(line) {
         // SAFETY: not NULL, aligned.
         unsafe { line.cast_mut().write(at) };
     }
-    answer(outcome)
+    status
 }
 
 /// Checks every parameter and the relations between them. If some do not hold,
@@ -178,7 +178,7 @@ pub unsafe extern "C" fn fitmac_config_check(
 ) -> Status {
     // SAFETY: promised.
     let mut out = unsafe { TextOut::new(message, size) };
-    let mut check = || {
+    let check = || {
         // SAFETY: promised; the stamp shows that it was initialised.
         let params = unsafe { (*Config::read(config)?).params };
         params.validate().map(|_| ()).map_err(|violations| {
@@ -187,5 +187,5 @@ pub unsafe extern "C" fn fitmac_config_check(
             Status::OutOfRange
         })
     };
-    answer(check())
+    run(check)
 }

@@ -15,7 +15,7 @@ use crate::{
     config::Config,
     fork,
     memory::{ALIGNMENT, Stamp, assert_alignment, checked, room},
-    status::{Outcome, Status, answer},
+    status::{Outcome, Status, run},
 };
 
 const MAGIC: u64 = u64::from_le_bytes(*b"FITMAC-C");
@@ -154,7 +154,7 @@ pub unsafe extern "C" fn fitmac_controller_init(
         let out = checked(controller)?.cast_mut();
         // SAFETY: promised.
         let params = unsafe { Config::valid(config) }?;
-        let core = catch_unwind(|| Core::new(params)).map_err(|_| Status::Panicked)?;
+        let core = Core::new(params);
         // SAFETY: there is room; both pointers were checked.
         unsafe {
             place.write(Controller {
@@ -167,7 +167,7 @@ pub unsafe extern "C" fn fitmac_controller_init(
         }
         Ok(())
     };
-    answer(make())
+    run(make)
 }
 
 /// Retires a controller: later calls on it are refused. There is nothing to
@@ -184,7 +184,7 @@ pub unsafe extern "C" fn fitmac_controller_deinit(controller: *mut Controller) -
         unsafe { &(*controller).mark }.store(0, Ordering::Release);
         Ok(())
     };
-    answer(retire())
+    run(retire)
 }
 
 /// Makes a controller as new: it forgets everything but its parameters. (To
@@ -199,7 +199,7 @@ pub unsafe extern "C" fn fitmac_reset(controller: *mut Controller) -> Status {
         Ok(())
     };
     // SAFETY: promised.
-    answer(unsafe { with_state(controller, AfterFailure::Allow, reset) })
+    run(|| unsafe { with_state(controller, AfterFailure::Allow, reset) })
 }
 
 /// Bytes that a `fitmac_snapshot` takes.
@@ -237,7 +237,7 @@ pub unsafe extern "C" fn fitmac_take_snapshot(
         // SAFETY: promised.
         unsafe { with(controller, write) }
     };
-    answer(take())
+    run(take)
 }
 
 /// Goes on from a snapshot of a controller with the same parameters. Bytes that
@@ -265,7 +265,7 @@ pub unsafe extern "C" fn fitmac_restore(
         // SAFETY: promised.
         unsafe { with_state(controller, AfterFailure::Allow, read) }
     };
-    answer(restore())
+    run(restore)
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
 //! What a call answers.
 
-use core::ffi::c_char;
+use core::{ffi::c_char, panic::AssertUnwindSafe};
+use std::panic::catch_unwind;
+
+use crate::float::DefaultState;
 
 /// What a call answers: 0 is success, all else an error that changed nothing.
 #[repr(u32)]
@@ -97,10 +100,18 @@ pub extern "C" fn fitmac_status_text(status: u32) -> *const c_char {
 
 pub(crate) type Outcome<T> = Result<T, Status>;
 
-/// The answer of a call.
+/// The answer of a call whose outcome is known.
 pub(crate) fn answer(outcome: Outcome<()>) -> Status {
     match outcome {
         Ok(()) => Status::Ok,
         Err(status) => status,
     }
+}
+
+/// The answer of a call that computes: by the default floating-point state,
+/// and without letting a panic out.
+pub(crate) fn run(call: impl FnOnce() -> Outcome<()>) -> Status {
+    let _float = DefaultState::enter();
+    let outcome = catch_unwind(AssertUnwindSafe(call));
+    answer(outcome.unwrap_or(Err(Status::Panicked)))
 }

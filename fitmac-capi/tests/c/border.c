@@ -59,7 +59,7 @@ static fitmac_state_sample state_at(uint64_t n) {
     state.session = 1;
     state.stamp_ns = n * 1000000u;
     state.applied_command = n - 1;
-    state.ee_position_m[0] = 0.4 + 1e-4 * (double)n;
+    state.ee_position_m[0] = 0.375 + (double)n / 8192; /* exact: rounding has no say */
     state.ee_position_m[2] = 0.3;
     state.ee_orientation[1] = 1.0;
     state.gripper_width_m = 0.08;
