@@ -31,7 +31,9 @@ pub struct Attempt {
     steps: u32,
     hand: Hand,
     wrong_approach: Option<WrongApproach>,
-    lowering_steps: u32,
+    straying_steps: u32,
+    /// Nearest that the carried target came to its destination, m.
+    nearest_xy_m: Option<f64>,
     rest_steps: u32,
     held_other: Option<Held>,
     latched: u64,
@@ -67,7 +69,8 @@ impl Attempt {
             steps: 0,
             hand: Hand::Unseen,
             wrong_approach: None,
-            lowering_steps: 0,
+            straying_steps: 0,
+            nearest_xy_m: None,
             rest_steps: 0,
             held_other: None,
             latched: 0,
@@ -211,7 +214,8 @@ impl Attempt {
         }
     }
 
-    /// The lifted target falls from the hand, or is lowered elsewhere.
+    /// The lifted target falls from the hand, or is taken elsewhere: lowered
+    /// away from its destination, or carried away from it.
     fn watch_carry(
         &mut self,
         params: &EvidenceParams,
@@ -221,23 +225,29 @@ impl Attempt {
         let (Carry::Lifted { top_z_m, grip_z_m }, Some(target)) =
             (estimator.carry(), &signals.target)
         else {
-            self.lowering_steps = 0;
+            self.straying_steps = 0;
+            self.nearest_xy_m = None;
             return 0;
         };
         let z = target.position_m[2];
         let fell = signals.ee_m[2] - z - grip_z_m > params.dropped_m;
-        let lowered_elsewhere = params.wrong_destination_steps > 0
-            && top_z_m - z > params.wrong_destination_drop_m
-            && signals
-                .destination
-                .is_some_and(|d| d.distance_xy_m > params.wrong_destination_xy_m);
-        self.lowering_steps = if lowered_elsewhere {
-            self.lowering_steps.saturating_add(1)
+        let strays = signals.destination.is_some_and(|d| {
+            let nearest_m = self
+                .nearest_xy_m
+                .map_or(d.distance_xy_m, |n| n.min(d.distance_xy_m));
+            self.nearest_xy_m = Some(nearest_m);
+            let lowered = top_z_m - z > params.wrong_destination_drop_m
+                && d.distance_xy_m > params.wrong_destination_xy_m;
+            lowered || d.distance_xy_m - nearest_m > params.wrong_destination_away_m
+        });
+        self.straying_steps = if strays {
+            self.straying_steps.saturating_add(1)
         } else {
             0
         };
         let mut bits = if fell { evidence::DROPPED } else { 0 };
-        if lowered_elsewhere && self.lowering_steps >= params.wrong_destination_steps {
+        let patience = params.wrong_destination_steps;
+        if patience > 0 && self.straying_steps >= patience {
             bits |= evidence::WRONG_DESTINATION;
         }
         bits

@@ -39,7 +39,7 @@ bits! {
     CRITIC_EXECUTION = 16 "critic_execution",
     /// The released object rests outside its region.
     MISPLACED = 17 "misplaced",
-    /// The held object is lowered away from its destination.
+    /// The held object is carried or lowered away from its destination.
     WRONG_DESTINATION = 18 "wrong_destination",
     /// The detector keeps naming another target than the locked one.
     FLAPPING = 19 "flapping",

@@ -202,12 +202,14 @@ stage! {
         moving_away_steps: u32 = 8 in 1..=8, "steps";
         /// Fall of a lifted object with a closed gripper that is a drop.
         dropped_m: f64 = 0.03 in 0.005..=0.5, "m";
-        /// Steps of lowering the object away from its destination that are a wrong destination; 0 turns it off.
+        /// Steps of lowering the object away from its destination, or of carrying it away, that are a wrong destination; 0 turns it off.
         wrong_destination_steps: u32 = 3 in 0..=100, "steps";
         /// Horizontal distance to the destination from which lowering is wrong.
         wrong_destination_xy_m: f64 = 0.08 in 0.01..=1.0, "m";
         /// Fall below the highest point of the carry that is lowering.
         wrong_destination_drop_m: f64 = 0.05 in 0.005..=0.5, "m";
+        /// Growth of the horizontal distance to the destination over its least in the carry that is carrying away.
+        wrong_destination_away_m: f64 = 0.06 in 0.005..=1.0, "m";
         /// Motion over four steps below which a released object is at rest (a 20 Hz step apart, 2 mm are 10 mm/s; the default leaves room for noisy poses).
         rest_distance_m: f64 = 0.008 in 0.0001..=0.1, "m";
         /// Steps at rest that settle the outcome of a release.
