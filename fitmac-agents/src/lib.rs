@@ -6,7 +6,9 @@
 //! allow.
 
 pub mod canvas;
+pub mod critic;
 pub mod grounder;
+pub mod model;
 pub mod planner;
 pub mod scene;
 pub mod synthetic;

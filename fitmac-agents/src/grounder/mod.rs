@@ -22,6 +22,7 @@ pub mod kappa;
 mod pool;
 mod rank;
 pub mod relation;
+pub mod resolver;
 mod viewpoint;
 
 #[cfg(test)]
