@@ -5,11 +5,14 @@
 //! learned detector may be added and are never trusted further than the rules
 //! allow.
 
+pub mod bind;
 pub mod canvas;
 pub mod critic;
 pub mod grounder;
 pub mod model;
 pub mod planner;
+pub mod prompt;
 pub mod scene;
+pub mod service;
 pub mod synthetic;
 pub mod track;
