@@ -59,7 +59,7 @@ pub enum Event {
         text: String,
     },
     /// A grounding for the controller.
-    Grounding(GroundingRecord),
+    Grounding(Box<GroundingRecord>),
     /// The critic's word for the controller.
     Critic(CriticReport),
     /// A model call for the trace.
@@ -363,7 +363,7 @@ impl AgentService {
             provenance: self.lock.map_or(Provenance::Rules, |lock| lock.provenance),
         };
         self.events
-            .push(Event::Grounding(bind::record(&header, grounding)));
+            .push(Event::Grounding(Box::new(bind::record(&header, grounding))));
     }
 
     fn ask_resolver(&mut self, now_ns: u64, grounding: &Grounding) {

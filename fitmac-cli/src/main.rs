@@ -56,6 +56,10 @@ enum Command {
     Demo(cmd::demo::Args),
     /// Say what of the real-time set-up is missing and how to get it.
     Doctor(cmd::doctor::Args),
+    /// Say which object of a scene an instruction means.
+    Ground(cmd::ground::Args),
+    /// Split an instruction into subtasks.
+    Plan(cmd::plan::Args),
     /// Run the simulated robot and its world.
     Sim(cmd::sim::Args),
     /// Run a surrogate policy.
@@ -81,6 +85,8 @@ fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Config(args) => cmd::config::run(&args),
         Command::Demo(args) => cmd::demo::run(&args),
         Command::Doctor(args) => cmd::doctor::run(&args),
+        Command::Ground(args) => cmd::ground::run(&args),
+        Command::Plan(args) => cmd::plan::run(&args),
         Command::Sim(args) => cmd::sim::run(&args),
         Command::Vla(args) => cmd::vla::run(&args),
     }

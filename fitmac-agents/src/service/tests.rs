@@ -37,7 +37,7 @@ const TWO: [(u16, [f64; 2]); 2] = [(1, [0.5, 0.0]), (2, [0.45, -0.17])];
 
 fn records(events: &[Event]) -> Vec<GroundingRecord> {
     let record = |event: &Event| match event {
-        Event::Grounding(record) => Some(*record),
+        Event::Grounding(record) => Some(**record),
         _ => None,
     };
     events.iter().filter_map(record).collect()

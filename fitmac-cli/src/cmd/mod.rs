@@ -4,5 +4,7 @@ pub(crate) mod agents;
 pub(crate) mod config;
 pub(crate) mod demo;
 pub(crate) mod doctor;
+pub(crate) mod ground;
+pub(crate) mod plan;
 pub(crate) mod sim;
 pub(crate) mod vla;
