@@ -60,8 +60,14 @@ enum Command {
     Ground(cmd::ground::Args),
     /// Split an instruction into subtasks.
     Plan(cmd::plan::Args),
+    /// Run recorded inputs through the core again and compare the answers.
+    Replay(cmd::replay::Args),
+    /// Run the controller in real time.
+    Rt(cmd::rt::Args),
     /// Run the simulated robot and its world.
     Sim(cmd::sim::Args),
+    /// Look into a recorded trace.
+    Trace(cmd::trace::Args),
     /// Run a surrogate policy.
     Vla(cmd::vla::Args),
 }
@@ -87,7 +93,10 @@ fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Doctor(args) => cmd::doctor::run(&args),
         Command::Ground(args) => cmd::ground::run(&args),
         Command::Plan(args) => cmd::plan::run(&args),
+        Command::Replay(args) => cmd::replay::run(&args),
+        Command::Rt(args) => cmd::rt::run(&args),
         Command::Sim(args) => cmd::sim::run(&args),
+        Command::Trace(args) => cmd::trace::run(&args),
         Command::Vla(args) => cmd::vla::run(&args),
     }
 }

@@ -12,6 +12,7 @@ use fitmac_core::{
     reason,
     wire::{Diagnosis, EventKind, Mode, Phase, Route, SubPhase, Verdict},
 };
+use fitmac_rt::trace::{Record, TraceReader};
 use serde::Serialize;
 
 /// What objects are called, by their ids.
@@ -34,12 +35,17 @@ pub(crate) struct Row {
     pub(crate) state: String,
 }
 
-/// The decisions of a recorded trace.
+/// The decisions and events of a recorded trace, as far as it can be read.
 pub(crate) fn read_decisions(trace: &std::path::Path) -> anyhow::Result<Vec<TraceRecord>> {
-    anyhow::bail!(
-        "{} cannot be read: this build has no trace reader",
-        trace.display()
-    )
+    let reader = TraceReader::open(trace)?;
+    let ticks = reader.filter_map(|record| match record {
+        Record::Tick(tick) => Some(tick.output),
+        Record::Prompt(..) | Record::Status(_) => None,
+    });
+    Ok(ticks
+        .flat_map(|output| [output.event, output.trace])
+        .flatten()
+        .collect())
 }
 
 /// The rows of an episode: its first query, each one that differs from the row

@@ -167,6 +167,7 @@ pub fn run<Tr: Transport, R: Record>(
         let ticks = cadence.counters.ticks.load(Relaxed);
         if demand == Demand::Last || ticks.is_multiple_of(COUNTS_EVERY) {
             cadence.publish_receivers(&cycle.endpoint().counts());
+            cadence.publish_refusals(cycle.core().state().refusals());
         }
         if let (Demand::Last, Some(end)) = (demand, end) {
             return Ok(end);

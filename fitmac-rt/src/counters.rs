@@ -2,6 +2,8 @@
 
 use core::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
+use fitmac_core::intake::{Refusal, RefusalCounts};
+
 use crate::{histogram::Histogram, message::COUNTER_CAPACITY, port::ReceiverCounts};
 
 /// What the loop counts.
@@ -17,6 +19,8 @@ pub struct LoopCounters {
     pub publish_faults: AtomicU64,
     /// Ticks that the recorder did not get, because its ring was full.
     pub unrecorded: AtomicU64,
+    /// Recorders that gave up, because the disk did.
+    pub recorders_failed: AtomicU64,
 }
 
 /// How long things took, and what was counted; the control thread writes, any
@@ -36,6 +40,7 @@ pub struct Cadence {
     /// sample only.
     pub response: Histogram,
     receivers: Receivers,
+    refusals: Refusals,
 }
 
 /// Services that the controller receives, and what is counted of each.
@@ -55,21 +60,31 @@ const OF_RECEIVER: [&str; 5] = [
     "transport_faults",
     "sessions",
 ];
-const OF_LOOP: [&str; 5] = [
+const OF_LOOP: [&str; 6] = [
     "ticks",
     "overruns",
     "skipped_periods",
     "publish_faults",
     "unrecorded_ticks",
+    "recorders_failed",
 ];
 /// Counters in all.
-pub const COUNT: usize = OF_LOOP.len() + RECEIVERS.len() * OF_RECEIVER.len();
+pub const COUNT: usize = OF_LOOP.len() + RECEIVERS.len() * OF_RECEIVER.len() + Refusal::ALL.len();
 const _: () = assert!(COUNT <= COUNTER_CAPACITY);
 
 #[derive(Debug)]
 struct Receivers([AtomicU64; RECEIVERS.len() * OF_RECEIVER.len()]);
 
 impl Default for Receivers {
+    fn default() -> Self {
+        Self(core::array::from_fn(|_| AtomicU64::new(0)))
+    }
+}
+
+#[derive(Debug)]
+struct Refusals([AtomicU64; Refusal::ALL.len()]);
+
+impl Default for Refusals {
     fn default() -> Self {
         Self(core::array::from_fn(|_| AtomicU64::new(0)))
     }
@@ -83,10 +98,12 @@ pub fn names() -> Vec<String> {
             .iter()
             .map(move |what| format!("{service}.{what}"))
     });
+    let refused = Refusal::ALL.iter().map(|r| format!("refused.{}", r.name()));
     OF_LOOP
         .iter()
         .map(|&name| name.to_owned())
         .chain(of_receivers)
+        .chain(refused)
         .collect()
 }
 
@@ -108,6 +125,13 @@ impl Cadence {
         }
     }
 
+    /// Copies the core's counts of refused messages to where other threads see them.
+    pub(crate) fn publish_refusals(&self, counts: &RefusalCounts) {
+        for (place, (_, count)) in self.refusals.0.iter().zip(counts.iter()) {
+            place.store(u64::from(count), Relaxed);
+        }
+    }
+
     /// All counters, in the order of [`names`].
     #[must_use]
     pub fn values(&self) -> [u64; COUNT] {
@@ -118,12 +142,14 @@ impl Cadence {
             &c.skipped,
             &c.publish_faults,
             &c.unrecorded,
+            &c.recorders_failed,
         ];
         let mut values = [0; COUNT];
-        for (value, counter) in values
-            .iter_mut()
-            .zip(of_loop.into_iter().chain(&self.receivers.0))
-        {
+        let all = of_loop
+            .into_iter()
+            .chain(&self.receivers.0)
+            .chain(&self.refusals.0);
+        for (value, counter) in values.iter_mut().zip(all) {
             *value = counter.load(Relaxed);
         }
         values

@@ -339,6 +339,9 @@ pub struct ControllerLock {
 impl Drop for ControllerLock {
     fn drop(&mut self) {
         let _ = fs::remove_file(&self.path);
+        // The last member may have left before us. A directory that is not
+        // empty stays.
+        let _ = self.path.parent().map(fs::remove_dir);
     }
 }
 
@@ -391,8 +394,10 @@ mod tests {
                 .contains(&std::process::id().to_string())
         );
         drop(first);
-        drop(instance.lock_controller().expect("free again"));
-        assert_eq!(instance.files(), Vec::<PathBuf>::new());
+        let again = instance.lock_controller().expect("free again");
+        drop(instance.join().expect("joins"));
+        drop(again);
+        assert!(!instance.root().exists());
     }
 
     #[test]

@@ -9,9 +9,11 @@
 //! own controller. A stop of ours is a request to it.
 
 pub mod clock;
+pub mod config;
 pub mod control_loop;
 pub mod counters;
 pub mod cycle;
+pub mod diff;
 pub mod endpoint;
 pub mod envelope;
 pub mod frame;
@@ -21,9 +23,11 @@ pub mod layout;
 pub mod message;
 pub mod port;
 pub mod realtime;
+pub mod replay;
 pub mod ring;
 pub mod roles;
 pub mod service;
 pub mod signals;
 pub mod telemetry;
+pub mod trace;
 pub mod transport;

@@ -3,7 +3,7 @@
 
 use std::{
     io,
-    sync::Arc,
+    sync::{Arc, atomic::Ordering::Relaxed},
     thread::{self, JoinHandle},
     time::Duration,
 };
@@ -184,7 +184,7 @@ struct Consumer {
 }
 
 impl Consumer {
-    fn take(&mut self, action: impl FnOnce(&mut dyn Consume) -> io::Result<()>) {
+    fn take(&mut self, cadence: &Cadence, action: impl FnOnce(&mut dyn Consume) -> io::Result<()>) {
         if self.failed.is_none()
             && let Err(e) = action(&mut *self.inner)
         {
@@ -192,6 +192,7 @@ impl Consumer {
                 "fitmac: {} stopped: {e}; the loop goes on without it",
                 self.inner.name()
             );
+            cadence.counters.recorders_failed.fetch_add(1, Relaxed);
             self.failed = Some(e);
         }
     }
@@ -240,7 +241,7 @@ impl Worker {
         self.consumers
             .into_iter()
             .map(|mut consumer| {
-                consumer.take(|c| c.finish());
+                consumer.take(&self.cadence, |c| c.finish());
                 Recorded {
                     name: consumer.inner.name(),
                     outcome: consumer.failed.map_or(Ok(()), Err),
@@ -257,7 +258,7 @@ impl Worker {
             any = true;
             self.newest = tick.output.command;
             for consumer in &mut self.consumers {
-                consumer.take(|c| c.tick(&tick));
+                consumer.take(&self.cadence, |c| c.tick(&tick));
                 consumer.ticks += u64::from(consumer.failed.is_none());
             }
             if let Some(trace) = &tick.output.trace {
@@ -272,7 +273,7 @@ impl Worker {
         while let Some(envelope) = self.ends.prompt.poll() {
             let (now_ns, prompt) = (envelope.header.stamp_ns, envelope.payload);
             for consumer in &mut self.consumers {
-                consumer.take(|c| c.prompt(now_ns, &prompt));
+                consumer.take(&self.cadence, |c| c.prompt(now_ns, &prompt));
             }
         }
     }
@@ -289,7 +290,7 @@ impl Worker {
         let status = status(now_ns, &self.newest, &self.cadence);
         let _ = self.ends.status.send(now_ns, &status);
         for consumer in &mut self.consumers {
-            consumer.take(|c| c.status(&status));
+            consumer.take(&self.cadence, |c| c.status(&status));
         }
     }
 }

@@ -6,5 +6,8 @@ pub(crate) mod demo;
 pub(crate) mod doctor;
 pub(crate) mod ground;
 pub(crate) mod plan;
+pub(crate) mod replay;
+pub(crate) mod rt;
 pub(crate) mod sim;
+pub(crate) mod trace;
 pub(crate) mod vla;
