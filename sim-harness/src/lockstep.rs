@@ -25,6 +25,9 @@ const TICK_NS: u64 = 2_000_000;
 const _: () = assert!(TICK_NS as f64 * 1e-9 == PHYSICS_STEP_S);
 /// How long the agents take for a look, ns.
 const GROUNDING_LATENCY_NS: u64 = 200_000_000;
+/// When the agents first look, ns: a few frames are in by then, and the answer comes before the
+/// first query.
+const FIRST_LOOK_NS: u64 = 250_000_000;
 /// How often the agents look without being asked, ns.
 const GROUNDING_PERIOD_NS: u64 = 1_000_000_000;
 /// The run that the simulated processes belong to.
@@ -294,7 +297,7 @@ impl Lockstep {
     }
 
     fn look_again(&mut self, now_ns: u64) {
-        if self.sightings.is_empty() {
+        if now_ns < FIRST_LOOK_NS {
             return;
         }
         let subtask = self.controller.state().subtask().index();

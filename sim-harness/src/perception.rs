@@ -59,7 +59,7 @@ impl Default for PerceptionParams {
             dropout: 0.05,
             misdetection: 0.002,
             mislabel: 0.01,
-            min_visible: 0.25,
+            min_visible: 0.15,
         }
     }
 }
@@ -73,7 +73,7 @@ const JUMP_M: f64 = 0.06;
 /// Two frames confirm each other's jump within this distance, m.
 const CONFIRMED_M: f64 = 0.03;
 /// Points of an object that rays are cast at, as multiples of its half extent.
-const SAMPLE_POINTS: [[f64; 3]; 9] = [
+const SAMPLE_POINTS: [[f64; 3]; 13] = [
     [0.0, 0.0, 0.9],
     [0.7, 0.0, 0.9],
     [-0.7, 0.0, 0.9],
@@ -83,14 +83,21 @@ const SAMPLE_POINTS: [[f64; 3]; 9] = [
     [-0.9, 0.0, 0.0],
     [0.0, 0.9, 0.0],
     [0.0, -0.9, 0.0],
+    [0.9, 0.9, 0.0],
+    [0.9, -0.9, 0.0],
+    [-0.9, 0.9, 0.0],
+    [-0.9, -0.9, 0.0],
 ];
+
+/// Frames over which an object's name is voted.
+const VOTES: usize = 9;
 
 /// What is known of an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sighting {
     /// Identity within the scene.
     pub id: u16,
-    /// Whose name it got in the newest frame that showed it: its own id, if all went well.
+    /// Whose name it gets by a vote over the newest frames: its own id, if all goes well.
     pub named_as: u16,
     /// Where it was.
     pub pose: Pose,
@@ -126,6 +133,7 @@ pub struct Perception {
     frames: VecDeque<Frame>,
     tracks: Vec<Option<Sighting>>,
     unconfirmed: Vec<Option<Pose>>,
+    votes: Vec<VecDeque<u16>>,
 }
 
 impl Perception {
@@ -146,6 +154,7 @@ impl Perception {
             frames: VecDeque::new(),
             tracks: vec![None; count],
             unconfirmed: vec![None; count],
+            votes: vec![VecDeque::with_capacity(VOTES); count],
         }
     }
 
@@ -201,7 +210,7 @@ impl Perception {
             seen.push((!missed && !hidden).then(|| Measured {
                 pose: moved(&object.pose, noise, turn),
                 named_as: objects[if misnamed { name } else { i }].id,
-                confidence: (0.85 + 0.15 * shares[i] - doubt).clamp(0.0, 1.0),
+                confidence: (0.85 + 0.2 * shares[i] - doubt).clamp(0.0, 1.0),
             }));
         }
         for i in 0..seen.len() {
@@ -230,10 +239,11 @@ impl Perception {
                 }
                 continue;
             };
+            let named_as = vote(&mut self.votes[i], measured.named_as);
             let Some(known) = &mut self.tracks[i] else {
                 self.tracks[i] = Some(Sighting {
                     id,
-                    named_as: measured.named_as,
+                    named_as,
                     pose: measured.pose,
                     stamp_ns: frame.stamp_ns,
                     visible: true,
@@ -260,12 +270,27 @@ impl Perception {
             } else {
                 measured.pose
             };
-            known.named_as = measured.named_as;
+            known.named_as = named_as;
             known.stamp_ns = frame.stamp_ns;
             known.visible = true;
             known.confidence = measured.confidence;
         }
     }
+}
+
+/// The name with the most votes; the newest wins a tie.
+fn vote(votes: &mut VecDeque<u16>, newest: u16) -> u16 {
+    if votes.len() == VOTES {
+        votes.pop_front();
+    }
+    votes.push_back(newest);
+    let count = |name: u16| votes.iter().filter(|&&v| v == name).count();
+    votes
+        .iter()
+        .rev()
+        .copied()
+        .max_by_key(|&name| (count(name), name == newest))
+        .unwrap_or(newest)
 }
 
 /// For each object, the larger share of its sample points that one of the cameras sees.

@@ -29,9 +29,9 @@ impl Camera {
     #[must_use]
     pub fn agent_view(surface_m: f64) -> Self {
         Self {
-            position_m: [1.35, 0.0, 0.78 + surface_m],
-            look_at_m: [0.38, 0.0, 0.10 + surface_m],
-            fov_y_rad: 0.78,
+            position_m: [1.30, 0.0, 1.10 + surface_m],
+            look_at_m: [0.42, 0.0, 0.12 + surface_m],
+            fov_y_rad: 0.72,
         }
     }
 

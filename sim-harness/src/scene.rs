@@ -230,6 +230,19 @@ impl Scene {
         Ok(())
     }
 
+    /// Puts an object that is already in the scene somewhere else on the working surface.
+    ///
+    /// # Errors
+    /// [`SimError::Unknown`] if it does not exist.
+    pub fn place_at(&mut self, name: &str, xy_m: [f64; 2]) -> Result<(), SimError> {
+        let index = usize::from(self.by_name(name)?.id) - 1;
+        let surface_m = self.arena.surface_m;
+        let object = &mut self.objects[index];
+        let z = surface_m + object.kind.half_extent_m()[2] + CLEARANCE_M;
+        object.pose.position_m = [xy_m[0], xy_m[1], z];
+        Ok(())
+    }
+
     /// The scene as MJCF; it includes the robot as `panda.xml`.
     pub(crate) fn to_mjcf(&self) -> String {
         let Arena {
