@@ -1,4 +1,5 @@
 //! What crosses crates.
 
+pub mod link;
 pub mod oracle;
 pub mod world;

@@ -15,9 +15,23 @@ use crate::{
 
 /// Makes sure that the environment fits the pinned requirements.
 pub(crate) fn install(workspace: &Workspace) -> anyhow::Result<()> {
-    let requirements = workspace.oracle_requirements();
-    let wanted = fs::read_to_string(&requirements)
-        .with_context(|| format!("{} cannot be read", requirements.display()))?;
+    let requirements = [
+        (workspace.oracle_requirements(), "--prefer-binary"),
+        // Whole lists of what goes together, whatever the packages say.
+        (workspace.link_requirements(), "--no-deps"),
+    ];
+    let requirements: Vec<_> = requirements
+        .into_iter()
+        .filter(|(file, _)| file.exists())
+        .collect();
+    if requirements.is_empty() {
+        return Ok(()); // no oracle is in use
+    }
+    let mut wanted = String::new();
+    for (file, _) in &requirements {
+        wanted += &fs::read_to_string(file)
+            .with_context(|| format!("{} cannot be read", file.display()))?;
+    }
     let environment = workspace.oracle_environment();
     let made_from = environment.join("made-from-requirements.txt");
     if fs::read_to_string(&made_from).is_ok_and(|made| made == wanted) {
@@ -30,21 +44,21 @@ pub(crate) fn install(workspace: &Workspace) -> anyhow::Result<()> {
     fs::create_dir_all(&environment).map_err(|error| not_writable(&environment, &error))?;
     Python::find()?.create_environment(&environment)?;
     let python = Python::of_environment(&environment);
-    let arguments = [
-        "install",
-        "--only-binary=:all:",
-        "--retries=2",
-        "--requirement",
-    ];
-    let arguments = arguments
-        .iter()
-        .map(AsRef::as_ref)
-        .chain([requirements.as_os_str()]);
-    if !python.pip(arguments)? {
-        bail!(
-            "pip could not install the test oracles (its reason is above): check the network or \
-             the proxy and run this again"
-        );
+    for (file, option) in &requirements {
+        let arguments = [
+            "install",
+            "--retries=2",
+            "--only-binary=:all:",
+            option,
+            "--requirement",
+        ];
+        let arguments = arguments.iter().map(AsRef::as_ref);
+        if !python.pip(arguments.chain([file.as_os_str()]))? {
+            bail!(
+                "pip could not install the test oracles (its reason is above): check the network \
+                 or the proxy and run this again"
+            );
+        }
     }
     fs::write(&made_from, wanted).map_err(|error| not_writable(&made_from, &error))
 }

@@ -37,6 +37,11 @@ impl Workspace {
         self.root.join("tests/oracles/requirements.txt")
     }
 
+    /// The pinned packages of the tests of other languages' interfaces.
+    pub(crate) fn link_requirements(&self) -> PathBuf {
+        self.root.join("tests/oracles/link-requirements.txt")
+    }
+
     /// The Python environment of the test oracles.
     pub(crate) fn oracle_environment(&self) -> PathBuf {
         self.root.join(".venv")
