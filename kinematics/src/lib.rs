@@ -7,6 +7,7 @@
 
 pub mod arm;
 pub mod chain;
+pub mod clearance;
 pub mod diff_ik;
 pub mod elementary;
 pub mod jacobian;
