@@ -56,8 +56,14 @@ enum Command {
     Demo(cmd::demo::Args),
     /// Say what of the real-time set-up is missing and how to get it.
     Doctor(cmd::doctor::Args),
+    /// Forward kinematics and Jacobian for lines of joint coordinates.
+    Fk(cmd::fk::Args),
     /// Say which object of a scene an instruction means.
     Ground(cmd::ground::Args),
+    /// Inverse kinematics for lines of poses.
+    Ik(cmd::ik::Args),
+    /// Jerk-limited motions for lines of states, targets and limits.
+    Otg(cmd::otg::Args),
     /// Split an instruction into subtasks.
     Plan(cmd::plan::Args),
     /// Run recorded inputs through the core again and compare the answers.
@@ -91,7 +97,10 @@ fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Config(args) => cmd::config::run(&args),
         Command::Demo(args) => cmd::demo::run(&args),
         Command::Doctor(args) => cmd::doctor::run(&args),
+        Command::Fk(args) => cmd::fk::run(&args),
         Command::Ground(args) => cmd::ground::run(&args),
+        Command::Ik(args) => cmd::ik::run(&args),
+        Command::Otg(args) => cmd::otg::run(&args),
         Command::Plan(args) => cmd::plan::run(&args),
         Command::Replay(args) => cmd::replay::run(&args),
         Command::Rt(args) => cmd::rt::run(&args),

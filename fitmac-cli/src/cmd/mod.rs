@@ -1,10 +1,14 @@
 //! The commands, one a file.
 
 pub(crate) mod agents;
+pub(crate) mod arm;
 pub(crate) mod config;
 pub(crate) mod demo;
 pub(crate) mod doctor;
+pub(crate) mod fk;
 pub(crate) mod ground;
+pub(crate) mod ik;
+pub(crate) mod otg;
 pub(crate) mod plan;
 pub(crate) mod replay;
 pub(crate) mod rt;
