@@ -1,116 +1,43 @@
-//! The core's parameters as text: TOML files, and single assignments.
-
-use std::{fs::File, io, io::Read, path::Path};
+//! The core's parameters as text: how a trace carries them, and how a replay
+//! changes one.
 
 use fitmac_core::{Params, ValidParams};
 use toml::{Table, Value};
 
-/// Longest configuration file, bytes.
-const SIZE_MAX: u64 = 64 << 10;
-
 /// Parameters that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    /// The file cannot be read.
-    #[error("{origin} cannot be read: {source}")]
-    Io {
-        /// The file.
-        origin: String,
-        /// Why.
-        source: io::Error,
-    },
-    /// The file is too long to be a configuration.
-    #[error("{0} is longer than {SIZE_MAX} bytes: this is no FIT-MAC configuration")]
-    TooLong(String),
     /// It is no TOML, or a key or a type is wrong.
     #[error("{origin}: {detail}")]
     Text {
-        /// The file or the argument.
+        /// Where the text comes from.
         origin: String,
         /// What the parser says: line, key, what it expected.
         detail: String,
     },
-    /// There is no such profile.
-    #[error("{origin}: there is no profile `{name}`; there are `guarded` and `paper`")]
-    Profile {
-        /// The file or the argument.
-        origin: String,
-        /// What was asked for.
-        name: String,
-    },
     /// Values are out of range, or contradict each other.
     #[error("{origin}: {}", .violations.join("; "))]
     Values {
-        /// The file or the argument.
+        /// Where the text comes from.
         origin: String,
         /// Every violation.
         violations: Vec<String>,
     },
 }
 
-/// The parameters of a named profile.
-///
-/// # Errors
-/// If there is no such profile.
-pub fn profile(origin: &str, name: &str) -> Result<Params, ConfigError> {
-    match name {
-        "guarded" => Ok(Params::guarded()),
-        "paper" => Ok(Params::paper()),
-        _ => Err(ConfigError::Profile {
-            origin: origin.into(),
-            name: name.escape_default().to_string(),
-        }),
-    }
-}
-
-/// Reads parameters from a file. Keys that it doesn't name keep the value of
-/// the file's `profile` (`guarded` if it names none).
-///
-/// # Errors
-/// If the file is unreadable, misspelt or out of range.
-pub fn load(path: &Path) -> Result<ValidParams, ConfigError> {
-    let origin = path.display().to_string();
-    let mut text = String::new();
-    let n = File::open(path)
-        .and_then(|file| file.take(SIZE_MAX + 1).read_to_string(&mut text))
-        .map_err(|source| ConfigError::Io {
-            origin: origin.clone(),
-            source,
-        })?;
-    if n as u64 > SIZE_MAX {
-        return Err(ConfigError::TooLong(origin));
-    }
-    parse(&origin, &text)
-}
-
-/// Parameters from text, as [`load`] reads them from a file.
+/// Parameters from text (TOML). Keys that it doesn't name have their default.
 ///
 /// # Errors
 /// If the text is misspelt or out of range.
 pub fn parse(origin: &str, text: &str) -> Result<ValidParams, ConfigError> {
-    let bad = |detail: String| ConfigError::Text {
+    let params = toml::from_str(text).map_err(|e| ConfigError::Text {
         origin: origin.into(),
-        detail,
-    };
-    let mut table: Table = toml::from_str(text).map_err(|e| bad(e.to_string()))?;
-    let base = match table.remove("profile") {
-        None => Params::default(),
-        Some(Value::String(name)) => profile(origin, &name)?,
-        Some(_) => return Err(bad("profile must be text: `guarded` or `paper`".into())),
-    };
-    // Once by itself, for the place of a misspelt key.
-    if !text.contains("profile") {
-        toml::from_str::<Params>(text).map_err(|e| bad(e.to_string()))?;
-    }
-    let mut merged = to_table(&base).map_err(bad)?;
-    merge(&mut merged, table);
-    let params: Params = Value::Table(merged)
-        .try_into()
-        .map_err(|e: toml::de::Error| bad(e.to_string()))?;
+        detail: e.to_string(),
+    })?;
     validate(origin, params)
 }
 
-/// The parameters as a configuration file that [`parse`] reads back.
+/// The parameters as text that [`parse`] reads back.
 ///
 /// # Panics
 /// Never: parameters are numbers and names.
@@ -185,23 +112,7 @@ fn to_table(params: &Params) -> Result<Table, String> {
     Table::try_from(params).map_err(|e| e.to_string())
 }
 
-fn merge(base: &mut Table, over: Table) {
-    for (key, value) in over {
-        match (base.get_mut(&key), value) {
-            (Some(Value::Table(inner)), Value::Table(over)) => merge(inner, over),
-            (Some(Value::Float(slot)), Value::Integer(n)) => *slot = n as f64,
-            (_, value) => {
-                base.insert(key, value);
-            }
-        }
-    }
-}
-
-/// Checks parameters.
-///
-/// # Errors
-/// Every violation at once; `origin` says where the parameters come from.
-pub fn validate(origin: &str, params: Params) -> Result<ValidParams, ConfigError> {
+fn validate(origin: &str, params: Params) -> Result<ValidParams, ConfigError> {
     params.validate().map_err(|found| ConfigError::Values {
         origin: origin.into(),
         violations: found.iter().map(ToString::to_string).collect(),
@@ -222,24 +133,12 @@ mod tests {
     }
 
     #[test]
-    fn a_file_changes_what_it_names_and_keeps_the_profile() {
-        let got = parse("x", "profile = \"paper\"\n[gate]\nfailure_streak = 2\n").expect("valid");
-        let mut expected = Params::paper();
-        expected.gate.failure_streak = 2;
-        assert_eq!(*got.get(), expected);
-        let whole = parse("x", "[gate]\nconfidence = 1\n").expect("a whole number is a number");
-        assert_eq!(whole.get().gate.confidence, 1.0);
-    }
-
-    #[test]
     fn mistakes_are_named_with_their_place() {
         let says = |text: &str| parse("robot.toml", text).expect_err("wrong").to_string();
         let misspelt = says("[gate]\nfailure_streek = 2\n");
         assert!(misspelt.contains("failure_streek") && misspelt.contains("robot.toml"));
         assert!(misspelt.contains("line 2"), "{misspelt}");
         assert!(says("[gate]\nfailure_streak = \"two\"\n").contains("failure_streak"));
-        assert!(says("profile = \"brave\"").contains("guarded"));
-        assert!(says("profile = 3").contains("guarded"));
         let both = says("[gate]\nfailure_streak = 0\nconfidence = nan\n");
         assert!(both.contains("gate.failure_streak") && both.contains("gate.confidence"));
     }
@@ -273,17 +172,5 @@ mod tests {
             let error = assign(&base, &[bad]).expect_err("wrong").to_string();
             assert!(error.contains(says), "{bad}: {error}");
         }
-    }
-
-    #[test]
-    fn a_file_that_is_no_configuration_is_not_read_to_its_end() {
-        let dir = tempfile::tempdir().expect("a directory");
-        let path = dir.path().join("big.toml");
-        std::fs::write(&path, "#".repeat(SIZE_MAX as usize + 1)).expect("writes");
-        assert!(matches!(load(&path), Err(ConfigError::TooLong(_))));
-        assert!(matches!(
-            load(&dir.path().join("none.toml")),
-            Err(ConfigError::Io { .. })
-        ));
     }
 }

@@ -14,10 +14,7 @@ use fitmac_rt::{
 };
 use serde_json::json;
 
-use crate::{
-    cmd::rt::bad_input,
-    exit::{BadInput, Exit},
-};
+use crate::exit::{BadInput, Exit};
 
 /// Arguments of `replay`.
 #[derive(Clone, Debug, clap::Args)]
@@ -50,7 +47,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
     let mut reader = TraceReader::open(&args.trace).map_err(|e| BadInput(e.to_string()))?;
     let recorded = recorded_params(&reader, &args.trace)?;
-    let params = config::assign(&recorded, &args.what_if).map_err(bad_input)?;
+    let params = config::assign(&recorded, &args.what_if).map_err(|e| BadInput(e.to_string()))?;
     let report = replay(&mut reader, params);
     let damage = reader.damage();
     if args.json {
@@ -79,7 +76,8 @@ fn recorded_params<R: std::io::Read>(
             path.display()
         ))
     })?;
-    config::parse(&format!("the parameters in {}", path.display()), text).map_err(bad_input)
+    config::parse(&format!("the parameters in {}", path.display()), text)
+        .map_err(|e| BadInput(e.to_string()).into())
 }
 
 fn print(report: &ReplayReport, damage: Option<&Damage>, what_if: &[String]) {

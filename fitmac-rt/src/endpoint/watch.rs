@@ -4,6 +4,9 @@ use fitmac_core::message::Command;
 
 use crate::envelope::Envelope;
 
+/// A setpoint that is this slow stands, for all practical purposes.
+const STANDING_M_S: f64 = 1e-3;
+
 /// When a robot stops following.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CommandLimits {
@@ -104,6 +107,12 @@ impl CommandWatch {
         let (session, command) = (envelope.header.session, &envelope.payload);
         let age = now_ns.saturating_sub(envelope.header.stamp_ns);
         match self.standing {
+            // After a pause the same controller is followed again from a
+            // standstill only: never into the middle of a motion.
+            Standing::Waiting {
+                cause: StopCause::Silence,
+                past_session,
+            } if session == past_session && stands(command) => {}
             // Sessions only rise: a straggler of a dead controller, or one
             // that was stopped and wakes up again, is not followed.
             Standing::Waiting { past_session, .. } if session <= past_session => return,
@@ -137,6 +146,15 @@ impl CommandWatch {
             past_session,
         };
     }
+}
+
+/// Whether the command asks for no motion at all.
+fn stands(command: &Command) -> bool {
+    command.action[..6].iter().all(|a| *a == 0.0)
+        && command
+            .setpoint_velocity_m_s
+            .iter()
+            .all(|v| v.abs() < STANDING_M_S)
 }
 
 fn is_sound(command: &Command) -> bool {
@@ -179,15 +197,30 @@ mod tests {
             w.step(21 * MS + 1, None),
             CommandState::Stop(StopCause::Silence)
         );
-        // The same session does not come back: it must be started again.
-        let late = command(5, 22);
+        // The same session comes back from a standstill only.
+        let mut moving = command(5, 22);
+        moving.payload.action[0] = 0.2;
         assert_eq!(
-            w.step(22 * MS, Some(&late)),
+            w.step(22 * MS, Some(&moving)),
             CommandState::Stop(StopCause::Silence)
         );
-        let restarted = command(6, 23);
+        let mut coasting = command(5, 22);
+        coasting.payload.setpoint_velocity_m_s[1] = -0.1;
         assert_eq!(
-            w.step(23 * MS, Some(&restarted)),
+            w.step(22 * MS, Some(&coasting)),
+            CommandState::Stop(StopCause::Silence)
+        );
+        let standing = command(5, 23);
+        assert_eq!(
+            w.step(23 * MS, Some(&standing)),
+            CommandState::Follow(standing.payload)
+        );
+        // A new session is followed after a silence, wherever it begins.
+        w.step(60 * MS, None);
+        let mut restarted = command(6, 61);
+        restarted.payload.action[0] = 0.2;
+        assert_eq!(
+            w.step(61 * MS, Some(&restarted)),
             CommandState::Follow(restarted.payload)
         );
     }
@@ -198,10 +231,12 @@ mod tests {
         w.step(MS, Some(&command(5, 1)));
         let mut last = command(5, 2);
         last.payload.flags = Command::LAST;
-        assert_eq!(
-            w.step(2 * MS, Some(&last)),
-            CommandState::Stop(StopCause::Ended)
-        );
+        for arrived in [last, command(5, 3)] {
+            assert_eq!(
+                w.step(2 * MS, Some(&arrived)),
+                CommandState::Stop(StopCause::Ended)
+            );
+        }
     }
 
     #[test]

@@ -5,9 +5,8 @@ mod operator;
 use std::{collections::BTreeMap, path::PathBuf};
 
 use anyhow::Context;
-use fitmac_core::{Params, ValidParams, params::Switches};
+use fitmac_core::ValidParams;
 use fitmac_rt::{
-    config::{self, ConfigError},
     control_loop::{Ended, LoopOptions, LoopOptionsError, PERIOD_RANGE_NS, Trigger},
     counters::Cadence as Measured,
     instance::Instance,
@@ -19,6 +18,7 @@ use fitmac_rt::{
 };
 
 use crate::{
+    config,
     crew::{Cadence, Report},
     exit::{BadInput, Exit},
 };
@@ -48,7 +48,7 @@ pub(crate) struct Args {
     #[arg(long, default_value = "default")]
     instance: String,
     #[command(flatten)]
-    params: ParamArgs,
+    config: config::Args,
     #[command(flatten)]
     pace: PaceArgs,
     /// Record everything to this MCAP file.
@@ -57,23 +57,6 @@ pub(crate) struct Args {
     /// Where the last half minute is written when a fault stops the robot.
     #[arg(long, value_name = "DIR", default_value = "fitmac-black-box")]
     black_box: PathBuf,
-}
-
-/// Where parameters come from.
-#[derive(Clone, Debug, clap::Args)]
-struct ParamArgs {
-    /// A file of parameters (TOML).
-    #[arg(long, value_name = "FILE", conflicts_with = "profile")]
-    config: Option<PathBuf>,
-    /// Parameters by name: `guarded` or `paper`.
-    #[arg(long, default_value = "guarded")]
-    profile: String,
-    /// Set one parameter; may be given several times.
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
-    /// Switch all corrections off: the policy's actions pass through.
-    #[arg(long)]
-    backbone_only: bool,
 }
 
 /// How the loop keeps time.
@@ -112,7 +95,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
         return operator::run(action);
     }
     let signals = Signals::listen().context("signals cannot be listened to")?;
-    let params = args.params.read().map_err(bad_input)?;
+    let params = args.config.load()?;
     let timing = args.pace.timing()?;
     let instance = Instance::named(&args.instance).map_err(|e| BadInput(e.to_string()))?;
     let role = ControllerRole {
@@ -175,7 +158,7 @@ impl Args {
         let metadata: Metadata = BTreeMap::from([
             ("version".into(), env!("CARGO_PKG_VERSION").into()),
             ("instance".into(), self.instance.clone()),
-            ("params".into(), config::to_text(params)),
+            ("params".into(), fitmac_rt::config::to_text(params)),
             ("period_ns".into(), timing.period_ns.to_string()),
         ]);
         let black_box = BlackBox::new(self.black_box.clone(), metadata.clone());
@@ -190,27 +173,6 @@ impl Args {
             consumers.push(Box::new(file));
         }
         Ok(consumers)
-    }
-}
-
-impl ParamArgs {
-    fn read(&self) -> Result<ValidParams, ConfigError> {
-        let params = match &self.config {
-            Some(path) => config::load(path)?,
-            None => {
-                let text = format!("profile = {:?}", self.profile);
-                config::parse("--profile", &text)?
-            }
-        };
-        let params = config::assign(&params, &self.set)?;
-        if !self.backbone_only {
-            return Ok(params);
-        }
-        let alone = Params {
-            switches: Switches::BACKBONE_ONLY,
-            ..*params.get()
-        };
-        config::validate("--backbone-only", alone)
     }
 }
 
@@ -254,9 +216,4 @@ impl PaceArgs {
             ..RealTime::default()
         }
     }
-}
-
-/// What the user wrote is wrong, unless a file could not be read.
-pub(crate) fn bad_input(error: ConfigError) -> anyhow::Error {
-    BadInput(error.to_string()).into()
 }
