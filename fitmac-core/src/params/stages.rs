@@ -207,7 +207,7 @@ stage! {
         /// Horizontal distance to the destination from which lowering is wrong.
         wrong_destination_xy_m: f64 = 0.08 in 0.01..=1.0, "m";
         /// Fall below the highest point of the carry that is lowering.
-        wrong_destination_drop_m: f64 = 0.05 in 0.005..=0.5, "m";
+        wrong_destination_drop_m: f64 = 0.035 in 0.005..=0.5, "m";
         /// Growth of the horizontal distance to the destination over its least in the carry that is carrying away.
         wrong_destination_away_m: f64 = 0.06 in 0.005..=1.0, "m";
         /// Motion over four steps below which a released object is at rest (a 20 Hz step apart, 2 mm are 10 mm/s; the default leaves room for noisy poses).

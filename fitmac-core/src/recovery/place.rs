@@ -20,6 +20,10 @@ const OPEN_QUERIES: u32 = 10;
 const RETREAT_QUERIES: u32 = 8;
 /// Height above a surface that the object is lowered to, if nothing stops it, m.
 const TOUCH_M: f64 = 0.005;
+/// A way on which the arm rises faster than it arrives, m.
+const LONG_WAY_M: f64 = 0.20;
+/// How much of the rise may be left to such a way, m.
+const RISE_UNDER_WAY_M: f64 = 0.07;
 /// Change of the carried object's place in the hand that is a drop, m.
 const SLIP_M: f64 = 0.06;
 
@@ -147,7 +151,11 @@ impl Place {
     ) -> Flow<Outcome> {
         let [x, y, z] = scene.signals.ee_m;
         let carry_z = Self::carry_z(scene, target, d);
-        if carry_z - z <= scene.params.recovery.hover_z_m || scene.is_blocked() {
+        let left_m = carry_z - z;
+        // On a long way the rest of the rise is made under way.
+        let may_travel = left_m <= scene.params.recovery.hover_z_m
+            || (d.distance_xy_m > LONG_WAY_M && left_m < RISE_UNDER_WAY_M);
+        if may_travel || scene.is_blocked() {
             return self.go(Step::MoveAbove);
         }
         Flow::Done(Outcome::Act(Motion::to([x, y, carry_z], Grip::Close)))
