@@ -8,6 +8,7 @@
 pub mod bind;
 pub mod canvas;
 pub mod critic;
+pub mod detector;
 pub mod grounder;
 pub mod model;
 pub mod planner;
