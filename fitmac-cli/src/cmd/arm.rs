@@ -49,7 +49,6 @@ pub(crate) enum JacobianFrame {
 
 /// An arm of any number of joints.
 pub(crate) trait AnyArm {
-    fn joints(&self) -> usize;
     /// Middles of the joint ranges.
     fn middle(&self) -> Vec<f64>;
     fn solve(&self, q: &[f64], frame: JacobianFrame) -> Result<Forward, BadInput>;
@@ -103,10 +102,6 @@ fn coordinates<const N: usize>(name: &str, q: &[f64]) -> Result<[f64; N], BadInp
 }
 
 impl<A: Arm<N>, const N: usize> AnyArm for OfSize<A, N> {
-    fn joints(&self) -> usize {
-        N
-    }
-
     fn middle(&self) -> Vec<f64> {
         self.0.limits().iter().map(|limit| limit.middle()).collect()
     }
