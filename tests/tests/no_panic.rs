@@ -1,4 +1,5 @@
-//! No panic can be reached in `kinematics`, and nothing allocates: see `tests/no_panic`.
+//! No panic can be reached in `kinematics` nor in the tick of `fitmac-core`, and neither allocates:
+//! see `tests/no_panic`.
 
 use std::path::Path;
 use std::process::Command;

@@ -70,6 +70,15 @@ extern "C" fn check_clearance(path: &[Pose; 4], obstacles: &[Obstacle; 4]) {
     unknown(clearance::narrowest(&PANDA_HAND, path, obstacles).ok());
 }
 
+#[unsafe(no_mangle)]
+extern "C" fn check_tick(
+    controller: &mut fitmac_core::Controller,
+    now_ns: u64,
+    input: &fitmac_core::message::Input<'_>,
+) {
+    unknown(controller.tick(now_ns, input));
+}
+
 /// The control: an index out of range.
 #[cfg(feature = "control")]
 #[unsafe(no_mangle)]
