@@ -193,3 +193,21 @@ pub fn install(prefix: &Path) {
     let said = run(&mut command);
     assert!(said.starts_with("installed FIT-MAC"), "{said}");
 }
+
+/// The blocks of code in `language` of a page in `docs`.
+///
+/// # Panics
+/// If the page cannot be read or has none.
+#[must_use]
+pub fn blocks(page: &str, language: &str) -> Vec<String> {
+    let path = workspace_root().join("docs").join(page);
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let fence = format!("```{language}\n");
+    let rest = text.split(fence.as_str()).skip(1);
+    let found: Vec<String> = rest
+        .filter_map(|after| after.split("```").next())
+        .map(str::to_owned)
+        .collect();
+    assert!(!found.is_empty(), "{page} has no block of {language}");
+    found
+}

@@ -9,7 +9,7 @@ use std::{
 
 use fitmac_core::wire::Route;
 use fitmac_tests::{
-    link::{assert_same_bytes, install, recordings, run, tool},
+    link::{assert_same_bytes, blocks, install, recordings, run, tool},
     oracle::workspace_root,
 };
 
@@ -50,6 +50,32 @@ fn examples(prefix: &Path, build: &Path) {
     assert!(said.contains("allocations in the loop 0"), "{said}");
     let said = run(&mut Command::new(build.join("ros2_controller")));
     assert!(said.contains("allocations in update 0"), "{said}");
+}
+
+/// The page's own program, built by the page's own lines.
+fn as_the_page_says(prefix: &Path, folder: &Path) {
+    let [program] = &blocks("link-cpp.md", "cpp")[..] else {
+        panic!("one program")
+    };
+    let [lists] = &blocks("link-cpp.md", "cmake")[..] else {
+        panic!("one CMakeLists.txt")
+    };
+    fs::create_dir_all(folder).expect("the folder can be made");
+    fs::write(folder.join("main.cpp"), program).expect("it can be written");
+    fs::write(folder.join("CMakeLists.txt"), lists).expect("it can be written");
+    let [install, build] = &blocks("link-cpp.md", "sh")[..] else {
+        panic!("two commands")
+    };
+    assert_eq!(install.trim(), "cargo xtask install --prefix /opt/fitmac"); // done above
+    let line = build.replace("/opt/fitmac", &prefix.display().to_string());
+    let cmake = tool("cmake");
+    let path = std::env::var("PATH").unwrap_or_default();
+    let path = format!("{}:{path}", cmake.parent().expect("a folder").display());
+    let said = run(Command::new("sh")
+        .args(["-ec", &line])
+        .env("PATH", path)
+        .current_dir(folder));
+    assert_eq!(said.lines().last(), Some("mode hold"), "{said}");
 }
 
 /// Compiles the replaying host; `flags` come from pkg-config.
@@ -97,6 +123,7 @@ fn an_installed_library_links_and_answers_as_the_core_does() {
     let folder = scratch("link-cpp");
     let prefix = installed(&folder);
     examples(&prefix, &folder.join("build"));
+    as_the_page_says(&prefix, &folder.join("page"));
     let library = prefix.join("lib");
 
     let shared = folder.join("replay-shared");
