@@ -318,7 +318,7 @@ unsafe impl<T: Plain, const N: usize> Plain for [T; N] {
     };
 }
 
-/// A message: plain data with a known layout. Implemented by [`layout!`].
+/// A message: plain data with a known layout. Implemented by the `layout!` macro.
 ///
 /// # Safety
 /// `Self` is `repr(C)`; `LAYOUT` lists all of its fields, each [`Plain`],
