@@ -1,7 +1,7 @@
 //! The lock: which instance is the target, how sure we are, and whether what
 //! is seen still agrees (`g_t`, `kappa_t` and `Inconsistent` of equation 7).
 //!
-//! The lock moves in one place only, [`Lock::commit`], which the controller
+//! The lock moves in one place only, `Lock::commit`, which the controller
 //! calls in a query whose route is target correction.
 
 use kinematics::vector;
