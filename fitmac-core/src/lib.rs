@@ -41,6 +41,7 @@ pub mod ladder;
 pub mod lock;
 pub mod message;
 pub mod monitor;
+pub mod oscillation;
 pub mod params;
 pub mod phase;
 pub mod queue;

@@ -5,6 +5,7 @@ use kinematics::vector::{self, Vector3};
 
 use crate::{
     evidence,
+    oscillation::Oscillation,
     params::{Params, Patience, Progress, Timeout},
     phase::is_pick,
     signals::Signals,
@@ -13,9 +14,6 @@ use crate::{
 
 /// Steps that the history holds: the longest Delta, and the newest.
 const HISTORY: usize = 9;
-
-/// Directions that the reversal monitor remembers.
-const TURNS: u32 = 64;
 
 /// What one step left behind.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,9 +84,7 @@ pub struct Monitor {
     history: History,
     idle_steps: u32,
     since_progress: u32,
-    turns: u64,
-    window_start_m: Option<f64>,
-    window_steps: u32,
+    oscillation: Oscillation,
 }
 
 impl Monitor {
@@ -97,9 +93,7 @@ impl Monitor {
             history: History::new(),
             idle_steps: 0,
             since_progress: u32::MAX,
-            turns: 0,
-            window_start_m: None,
-            window_steps: 0,
+            oscillation: Oscillation::new(),
         }
     }
 
@@ -118,9 +112,7 @@ impl Monitor {
     /// The phase changed: its windows start anew, differences still hold.
     pub(crate) fn enter_phase(&mut self) {
         self.idle_steps = 0;
-        self.turns = 0;
-        self.window_steps = 0;
-        self.window_start_m = None;
+        self.oscillation = Oscillation::new();
     }
 
     /// The target changed, or the arm was elsewhere: no difference holds.
@@ -136,7 +128,6 @@ impl Monitor {
         phase_steps: u32,
         signals: &Signals,
     ) -> u64 {
-        let before = self.history.ago(0).copied();
         self.history.push(Step::new(signals));
         let mut bits = 0;
         self.since_progress = self.since_progress.saturating_add(1);
@@ -156,47 +147,18 @@ impl Monitor {
         if phase_steps > timeout(&params.timeout, phase) {
             bits |= evidence::TIMEOUT;
         }
-        if self.oscillates(&params.progress, phase, before) {
+        let distance_m = if is_pick(phase) {
+            signals.target.map(|t| t.distance_m)
+        } else {
+            signals.destination.map(|d| d.distance_m)
+        };
+        if self
+            .oscillation
+            .step(&params.progress, signals.ee_m, distance_m)
+        {
             bits |= evidence::REVERSAL;
         }
         bits
-    }
-
-    /// Equation 5 is a disjunction: an arm that swings to and fro makes
-    /// "progress" for ever. This monitor counts turns instead.
-    fn oscillates(&mut self, params: &Progress, phase: Phase, before: Option<Step>) -> bool {
-        if params.reversals == 0 {
-            return false;
-        }
-        let (Some(now), Some(before), Some(earlier)) =
-            (self.history.ago(0), before, self.history.ago(2))
-        else {
-            return false;
-        };
-        let turn = vector::dot(
-            vector::sub(now.ee_m, before.ee_m),
-            vector::sub(before.ee_m, earlier.ee_m),
-        ) < -1e-6;
-        let mask = u64::MAX >> (TURNS - params.reversal_window_steps.clamp(1, TURNS));
-        self.turns = ((self.turns << 1) | u64::from(turn)) & mask;
-        let distance = if is_pick(phase) {
-            now.target_distance_m
-        } else {
-            now.destination_distance_m
-        };
-        if self.window_steps == 0 {
-            self.window_start_m = distance;
-        }
-        self.window_steps += 1;
-        let net = match (self.window_start_m, distance) {
-            (Some(start), Some(now)) => start - now,
-            _ => return false,
-        };
-        let stuck = self.turns.count_ones() >= params.reversals && net < params.reversal_net_m;
-        if self.window_steps >= params.reversal_window_steps {
-            self.window_steps = 0;
-        }
-        stuck
     }
 }
 
@@ -247,3 +209,6 @@ pub const fn timeout(params: &Timeout, phase: Phase) -> u32 {
         Phase::Complete => u32::MAX,
     }
 }
+
+#[cfg(test)]
+mod tests;
