@@ -118,3 +118,6 @@ impl DiagnosisHistory {
         &self.newest_first
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -205,3 +205,6 @@ impl Bits {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

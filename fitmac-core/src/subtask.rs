@@ -98,6 +98,42 @@ impl Subtask {
         &self.lock
     }
 
+    /// The phase and what carries it.
+    #[must_use]
+    pub const fn estimator(&self) -> &PhaseEstimator {
+        &self.estimator
+    }
+
+    /// The monitor.
+    #[must_use]
+    pub const fn monitor(&self) -> &Monitor {
+        &self.monitor
+    }
+
+    /// The attempt.
+    #[must_use]
+    pub const fn attempt(&self) -> &Attempt {
+        &self.attempt
+    }
+
+    /// The last diagnoses.
+    #[must_use]
+    pub const fn diagnoses(&self) -> &DiagnosisHistory {
+        &self.diagnoses
+    }
+
+    /// The streaks of the gate.
+    #[must_use]
+    pub const fn streaks(&self) -> &Streaks {
+        &self.streaks
+    }
+
+    /// The correction.
+    #[must_use]
+    pub const fn recovery(&self) -> &Recovery {
+        &self.recovery
+    }
+
     /// The signals of the newest policy step.
     #[must_use]
     pub const fn signals(&self) -> Option<&Signals> {

@@ -155,10 +155,15 @@ impl Controller {
             Waiting::Grounding { since_ns } => {
                 let waited = now_ns.saturating_sub(since_ns);
                 let over = waited > ms_to_ns(self.params.get().lock.rebind_wait_ms);
-                if self.state.grounding.proposal().is_some() || over {
-                    self.state.turn = Turn::Due;
+                if self.state.grounding.proposal().is_none() && !over {
+                    return None;
                 }
-                None
+                self.state.turn = Turn::Due;
+                if !self.state.clock.is_due(now_ns) {
+                    return None;
+                }
+                self.observe();
+                self.query(now_ns, report)
             }
         }
     }

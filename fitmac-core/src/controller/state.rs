@@ -97,6 +97,12 @@ impl State {
         &self.decision
     }
 
+    /// The action that is being executed.
+    #[must_use]
+    pub const fn action(&self) -> &Action {
+        &self.current.action
+    }
+
     /// Queries and corrections of the episode.
     #[must_use]
     pub const fn episode(&self) -> &Episode {

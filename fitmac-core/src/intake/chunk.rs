@@ -49,6 +49,8 @@ enum Answer {
 pub struct ChunkIntake {
     session: Option<u64>,
     last_sequence: u64,
+    /// Session and sequence of the last chunk, whatever became of it.
+    heard: Option<(u64, u64)>,
     question: Option<Question>,
     answer: Answer,
     latest: ActionChunk,
@@ -63,6 +65,7 @@ impl ChunkIntake {
         Self {
             session: None,
             last_sequence: 0,
+            heard: None,
             question: None,
             answer: Answer::None,
             latest: ActionChunk::default(),
@@ -207,6 +210,10 @@ impl ChunkIntake {
         now_ns: u64,
         chunk: &ActionChunk,
     ) -> Result<u64, Refusal> {
+        let name = (chunk.session, chunk.sequence);
+        if self.heard.replace(name) == Some(name) {
+            return Err(Refusal::Repeated);
+        }
         match self.session {
             Some(session) if session != chunk.session => {
                 self.session = Some(chunk.session);

@@ -68,6 +68,9 @@ impl GroundingIntake {
     ) -> Outcome {
         match self.session {
             Some(session) if session == record.session => {
+                if record.sequence == self.last_sequence {
+                    return Outcome::Refused(Refusal::Repeated);
+                }
                 if !is_newer(record.sequence, self.last_sequence) {
                     return Outcome::Refused(Refusal::Sequence);
                 }

@@ -34,7 +34,7 @@ macro_rules! refusals {
 }
 
 refusals! {
-    /// The sequence number does not rise.
+    /// The sequence number falls.
     Sequence "sequence" true,
     /// The sender restarted: the first message of the new session is not used.
     SessionChanged "session_changed" false,
@@ -72,6 +72,8 @@ refusals! {
     NotACandidate "not_a_candidate" true,
     /// A plan without subtasks, or with too many.
     BadPlan "bad_plan" true,
+    /// The message was heard before.
+    Repeated "repeated" false,
 }
 
 /// How often each reason occurred.

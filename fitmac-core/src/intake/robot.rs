@@ -28,6 +28,8 @@ pub enum Outcome {
 pub struct RobotIntake {
     latest: Option<StateSample>,
     jumps: u32,
+    /// The last sample that was refused as a jump.
+    jumped: Option<u64>,
 }
 
 impl RobotIntake {
@@ -35,6 +37,7 @@ impl RobotIntake {
         Self {
             latest: None,
             jumps: 0,
+            jumped: None,
         }
     }
 
@@ -60,6 +63,7 @@ impl RobotIntake {
             None => true,
             Some(last) if last.session != sample.session => true,
             Some(last) if last.sequence == sample.sequence => return Outcome::Duplicate,
+            Some(_) if self.jumped == Some(sample.sequence) => return Outcome::Duplicate,
             Some(last) if !is_newer(sample.sequence, last.sequence) => {
                 return Outcome::Refused(Refusal::Sequence);
             }
@@ -68,12 +72,14 @@ impl RobotIntake {
         if let Err(refusal) = validate(params, now_ns, sample) {
             return Outcome::Refused(refusal);
         }
-        let jumped = !restarted && self.jumped(params, sample);
+        let jumped = !restarted && self.is_jump(params, sample);
         if jumped && self.jumps < params.jump_samples {
-            self.jumps += 1;
+            self.jumps = self.jumps.saturating_add(1);
+            self.jumped = Some(sample.sequence);
             return Outcome::Refused(Refusal::Jump);
         }
         self.jumps = 0;
+        self.jumped = None;
         let kept = self.latest.insert(*sample);
         // Unused slots may hold anything; a snapshot must equal itself.
         let used = kept.object_count as usize;
@@ -86,7 +92,7 @@ impl RobotIntake {
         }
     }
 
-    fn jumped(&self, params: &StateParams, sample: &StateSample) -> bool {
+    fn is_jump(&self, params: &StateParams, sample: &StateSample) -> bool {
         self.latest.as_ref().is_some_and(|last| {
             let seconds = age_ns(sample.stamp_ns, last.stamp_ns) as f64 * 1e-9;
             let reach = params.jump_margin_m + params.jump_speed_m_s * seconds;

@@ -356,12 +356,16 @@ impl Active {
             }
         }
         // More changes than a query may make: stand still, go on in the next.
-        let grip = match &self.running {
+        act(scene, &Motion::to(scene.signals.ee_m, self.grip(scene)))
+    }
+
+    /// The gripper as the running step has it.
+    fn grip(&self, scene: &Scene<'_>) -> Grip {
+        match &self.running {
             Running::Place(place) if place.is_carrying() => Grip::Close,
-            _ if scene.signals.gripper.is_closed() => Grip::Close,
+            _ if scene.signals.gripper.state != GripperState::Open => Grip::Close,
             _ => Grip::Open,
-        };
-        act(scene, &Motion::to(scene.signals.ee_m, grip))
+        }
     }
 
     fn advance(&mut self, scene: &Scene<'_>) -> Flow<Step> {
@@ -426,11 +430,7 @@ impl Active {
         } else {
             1.0
         };
-        let grip = if scene.signals.gripper.state == GripperState::Open {
-            Grip::Open
-        } else {
-            Grip::Close
-        };
+        let grip = self.grip(scene);
         Some(Motion::to([x * share, y * share, z + up], grip))
     }
 }
