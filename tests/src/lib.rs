@@ -1,5 +1,7 @@
 //! What crosses crates.
 
+pub mod invariants;
 pub mod link;
 pub mod oracle;
+pub mod swarm;
 pub mod world;

@@ -133,10 +133,24 @@ impl World {
         self.now_ns
     }
 
+    /// Takes over time and counters of the world that this one replaces.
+    pub fn go_on_from(&mut self, before: &Self) {
+        self.now_ns = before.now_ns;
+        self.sequence = before.sequence;
+        self.applied_command = before.applied_command;
+        self.policy_step = before.policy_step;
+    }
+
     /// Tool centre point, m.
     #[must_use]
     pub const fn ee_m(&self) -> Vector3 {
         self.ee_m
+    }
+
+    /// Puts the arm at rest somewhere else.
+    pub fn place(&mut self, ee_m: Vector3) {
+        self.ee_m = ee_m;
+        self.goal_m = ee_m;
     }
 
     /// The hand's orientation.

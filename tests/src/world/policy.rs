@@ -41,6 +41,10 @@ pub struct Policy {
     pub delay_ns: u64,
     /// Share of the action box that its motions use.
     pub speed: f64,
+    /// Duration of its steps, ms.
+    pub step_ms: u32,
+    /// What its gripper number means.
+    pub gripper: GripperConvention,
     session: u64,
     sequence: u64,
     due: Option<(u64, ActionChunk)>,
@@ -48,8 +52,6 @@ pub struct Policy {
     asked: u64,
 }
 
-/// Duration of a policy step, ns.
-const STEP_NS: u64 = 50_000_000;
 /// A replayed episode is this long, steps.
 const REPLAY_STEPS: usize = 220;
 
@@ -62,6 +64,8 @@ impl Policy {
             horizon: 8,
             delay_ns: 30_000_000,
             speed: 1.0,
+            step_ms: 50,
+            gripper: GripperConvention::MinusOneOpen,
             session: 1,
             sequence: 0,
             due: None,
@@ -99,12 +103,16 @@ impl Policy {
             horizon: self.horizon,
             action_space: ActionSpace::OscPoseDelta.code(),
             frame: ActionFrame::Base.code(),
-            gripper: GripperConvention::MinusOneOpen.code(),
+            gripper: self.gripper.code(),
             ..ActionChunk::default()
         };
         let plan = self.plan(query, world, scene);
         for (slot, action) in chunk.actions.iter_mut().zip(plan) {
             *slot = action.map(|x| x as f32);
+            if self.gripper == GripperConvention::OneOpen {
+                let [.., grip] = slot;
+                *grip = if *grip > 0.0 { 0.0 } else { 1.0 };
+            }
         }
         self.due = Some((chunk.stamp_ns, chunk));
     }
@@ -125,7 +133,7 @@ impl Policy {
         if let Behaviour::Replays(moved_m) = self.behaviour {
             let memory = self
                 .memory
-                .get_or_insert_with(|| remember(moved_m, world, scene));
+                .get_or_insert_with(|| remember(moved_m, self.step_ms, world, scene));
             let played = query.policy_step as usize;
             let mut rest: Vec<Action> = memory.iter().skip(played).take(n).copied().collect();
             rest.resize(n, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0]);
@@ -142,6 +150,7 @@ impl Policy {
             relation: scene.relation,
             behaviour: &self.behaviour,
             speed: self.speed,
+            step_ms: self.step_ms,
             step: query.policy_step,
         };
         rollout(&task, world.clone(), n)
@@ -156,12 +165,13 @@ struct Task<'a> {
     relation: PlaceRelation,
     behaviour: &'a Behaviour,
     speed: f64,
+    step_ms: u32,
     step: u64,
 }
 
 /// The whole episode as it would go if the target stood `moved_m` away, from
 /// the end of the ten settling steps on.
-fn remember(moved_m: [f64; 2], world: &World, scene: &Scene) -> Vec<Action> {
+fn remember(moved_m: [f64; 2], step_ms: u32, world: &World, scene: &Scene) -> Vec<Action> {
     let mut imagined = world.clone();
     if let Some(body) = imagined.body_mut(scene.target) {
         body.position_m[0] += moved_m[0];
@@ -173,6 +183,7 @@ fn remember(moved_m: [f64; 2], world: &World, scene: &Scene) -> Vec<Action> {
         relation: scene.relation,
         behaviour: &Behaviour::Competent,
         speed: 1.0,
+        step_ms,
         step: 0,
     };
     let settle = vec![[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0]; 10];
@@ -188,7 +199,7 @@ fn rollout(task: &Task<'_>, mut world: World, n: usize) -> Vec<Action> {
         let action = act(&task, &world);
         world.start(&action);
         for _ in 0..5 {
-            world.advance(STEP_NS / 5);
+            world.advance(u64::from(task.step_ms) * 1_000_000 / 5);
         }
         task.step += 1;
         actions.push(action);
