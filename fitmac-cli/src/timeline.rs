@@ -52,13 +52,16 @@ pub(crate) fn read_decisions(trace: &std::path::Path) -> anyhow::Result<Vec<Trac
 /// before in what it saw or decided, and its last.
 pub(crate) fn rows(records: &[TraceRecord], names: &Names) -> Vec<Row> {
     let mut shown: Vec<&TraceRecord> = Vec::new();
-    for record in records {
+    // The queries tell the mode.
+    let mode_changed = EventKind::ModeChanged.code();
+    for record in records.iter().filter(|record| record.kind != mode_changed) {
         let news = shown.last().is_none_or(|last| key(last) != key(record));
         if news {
             shown.push(record);
         }
     }
-    if let (Some(last), Some(shown_last)) = (records.last(), shown.last())
+    let last = records.iter().rfind(|record| record.kind != mode_changed);
+    if let (Some(last), Some(shown_last)) = (last, shown.last())
         && last.query != shown_last.query
     {
         shown.push(last);

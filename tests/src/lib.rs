@@ -1,5 +1,6 @@
 //! What crosses crates.
 
+pub mod fitmac;
 pub mod invariants;
 pub mod link;
 pub mod oracle;

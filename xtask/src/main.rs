@@ -54,6 +54,8 @@ enum Command {
     Bench(cmd::bench::Args),
     /// Build the C library and install it with its headers and package files.
     Install(cmd::install::Args),
+    /// Write the documents that the code prints, or check them.
+    Docs(cmd::docs::Args),
     /// Say what the machine lacks to build and test.
     Doctor(cmd::doctor::Args),
 }
@@ -68,6 +70,7 @@ fn main() -> ExitCode {
         Command::Ci(args) => cmd::ci::run(&workspace, &args),
         Command::Bench(args) => cmd::bench::run(&workspace, &args),
         Command::Install(args) => cmd::install::run(&workspace, &args),
+        Command::Docs(args) => cmd::docs::run(&workspace, &args),
         Command::Doctor(args) => cmd::doctor::run(&workspace, &args),
     };
     match result {

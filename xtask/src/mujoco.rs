@@ -106,7 +106,7 @@ impl Drop for Staging {
 /// the file, also after a kill.
 fn lock(home: &Path) -> anyhow::Result<File> {
     let path = home.join(".lock");
-    let file = File::create(&path).map_err(|error| not_writable(&path, &error))?;
+    let file = File::create(&path).map_err(|error| not_writable(home, &error))?;
     file.lock()
         .with_context(|| format!("{} cannot be locked", path.display()))?;
     Ok(file)

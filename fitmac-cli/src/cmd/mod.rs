@@ -15,3 +15,11 @@ pub(crate) mod rt;
 pub(crate) mod sim;
 pub(crate) mod trace;
 pub(crate) mod vla;
+
+/// Keeps this process off the core that a controller takes by default, where
+/// there is another one.
+fn leave_control_core() {
+    if let Some(core) = fitmac_rt::realtime::allowed_cores().last() {
+        fitmac_rt::realtime::keep_off(*core);
+    }
+}

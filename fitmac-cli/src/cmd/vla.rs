@@ -16,7 +16,7 @@ use fitmac_core::{
 };
 use fitmac_rt::{
     clock, endpoint::PolicyEndpoint, instance::Instance, message::PromptText, port::Session,
-    transport::Ipc,
+    signals::Signals, transport::Ipc,
 };
 use sim_harness::{
     backbone::{Backbone, Chunk, Memory, Observation, Replay, ReplayParams, SeenObject},
@@ -26,9 +26,10 @@ use sim_harness::{
     suite::Suite,
 };
 
+use super::leave_control_core;
 use crate::{
     card::Card,
-    crew::{Interrupt, Report},
+    crew::Report,
     exit::{BadInput, Exit},
 };
 
@@ -60,7 +61,8 @@ pub(crate) struct Args {
 
 /// Answers queries until it is asked to end.
 pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
-    let interrupt = Interrupt::listen()?;
+    let signals = Signals::listen()?;
+    leave_control_core();
     let suite = Suite::embedded(&args.suite).map_err(|error| BadInput(error.to_string()))?;
     let mut backbone = Replay::new(ReplayParams::openvla_like(), Memory::of(&suite)?);
     backbone.reset(args.seed);
@@ -74,7 +76,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
         state: None,
     };
     Report::Ready.send();
-    while !interrupt.asked() {
+    while !signals.stop_requested() {
         view.refresh(&mut endpoint);
         let Some(query) = endpoint.poll_query() else {
             std::thread::sleep(LOOK);
@@ -89,7 +91,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
         let answer = backbone.infer(&observation);
         // A model takes its time; ours has to be made to.
         let latency = Duration::from_secs_f64(answer.latency_s.clamp(0.0, 60.0));
-        wait(latency.saturating_sub(started.elapsed()), &interrupt);
+        wait(latency.saturating_sub(started.elapsed()), &signals);
         let mut chunk = wrap(&answer, observed_ns)?;
         endpoint.send_chunk(clock::now_ns(), &query, &mut chunk)?;
     }
@@ -97,10 +99,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
 }
 
 /// Sleeps, unless we are asked to end.
-fn wait(duration: Duration, interrupt: &Interrupt) {
+fn wait(duration: Duration, signals: &Signals) {
     let until = Instant::now() + duration;
     while let Some(left) = until.checked_duration_since(Instant::now()) {
-        if interrupt.asked() {
+        if signals.stop_requested() {
             return;
         }
         std::thread::sleep(left.min(Duration::from_millis(20)));

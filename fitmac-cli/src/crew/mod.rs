@@ -4,7 +4,6 @@
 //! output; what it writes to standard error goes to a log file. A member that
 //! ends before it is asked to is a [`Loss`].
 
-mod interrupt;
 mod report;
 #[cfg(test)]
 mod tests;
@@ -24,7 +23,6 @@ use std::{
 use anyhow::Context;
 use rustix::process::{Pid, Signal, kill_process};
 
-pub(crate) use interrupt::Interrupt;
 pub(crate) use report::{Cadence, Outcome, Progress, Report};
 
 /// How often members are looked after.

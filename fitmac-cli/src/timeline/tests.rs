@@ -108,6 +108,16 @@ fn evidence_while_a_correction_runs_is_no_news() {
 }
 
 #[test]
+fn a_change_of_mode_has_no_row_of_its_own() {
+    let mut records = episode();
+    let mut changed = records[9];
+    changed.kind = EventKind::ModeChanged.code();
+    changed.mode = Mode::Stop.code();
+    records.push(changed);
+    assert_eq!(rows(&records, &names()), rows(&episode(), &names()));
+}
+
+#[test]
 fn what_is_unknown_is_shown_as_such() {
     let mut odd = record(0);
     odd.phase = 99;

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::test;
+use super::{docs, test};
 use crate::{mujoco, process, workspace::Workspace};
 
 /// Arguments of `ci`.
@@ -37,6 +37,7 @@ pub(crate) fn run(workspace: &Workspace, _args: &Args) -> anyhow::Result<()> {
     ]);
     process::run(doc.env("RUSTDOCFLAGS", "-Dwarnings"))?;
     test::run(workspace, &test::Args::default())?;
+    docs::run(workspace, &docs::Args { check: true })?;
     let minutes = started.elapsed().as_secs_f64() / 60.0;
     println!("cargo xtask ci: everything is green after {minutes:.1} minutes");
     Ok(())

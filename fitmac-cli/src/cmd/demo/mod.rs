@@ -10,8 +10,9 @@ mod summary;
 
 use std::{fs, path::PathBuf};
 
+use fitmac_rt::signals::Signals;
+
 use crate::{
-    crew::Interrupt,
     episode::{self, Perturbation},
     exit::{BadInput, Exit},
 };
@@ -48,12 +49,12 @@ pub(crate) struct Args {
 
 /// Does both runs and compares them.
 pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
-    let interrupt = Interrupt::listen()?;
+    let signals = Signals::listen()?;
     run::remove_stale_instances()?;
     let plan = plan(args)?;
     let mut runs = Vec::new();
     for variant in [Variant::PolicyAlone, Variant::FitMac] {
-        match plan.perform(variant, &interrupt) {
+        match plan.perform(variant, &signals) {
             Ok(run) => runs.push(run),
             Err(NoRun::Interrupted) => {
                 eprintln!("fitmac: interrupted; all processes have ended");

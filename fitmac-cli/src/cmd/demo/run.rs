@@ -9,13 +9,13 @@ use std::{
 
 use anyhow::{Context, bail};
 use fitmac_core::message::TraceRecord;
-use fitmac_rt::instance::Instance;
+use fitmac_rt::{instance::Instance, signals::Signals};
 use serde::Serialize;
 
 use super::status::StatusLine;
 use crate::{
     card::Card,
-    crew::{Cadence, Crew, Ending, Interrupt, Outcome, Report},
+    crew::{Cadence, Crew, Ending, Outcome, Report},
 };
 
 /// How long the processes may take to connect.
@@ -27,6 +27,9 @@ const EPISODE_MAX: Duration = Duration::from_secs(90);
 const END_MAX: Duration = Duration::from_secs(20);
 /// How long they may take when something went wrong.
 const ABORT_MAX: Duration = Duration::from_millis(1200);
+/// How long the control loop spins before each tick, us: a sleep alone wakes
+/// some 50 us late.
+const SPIN_US: &str = "150";
 /// What the names of our instances begin with.
 const INSTANCE_PREFIX: &str = "demo-";
 
@@ -103,7 +106,7 @@ struct Files {
 impl Plan {
     /// Performs a run: starts the processes, watches them, ends them, and
     /// leaves nothing behind but the run's folder.
-    pub(super) fn perform(&self, variant: Variant, interrupt: &Interrupt) -> Result<Run, NoRun> {
+    pub(super) fn perform(&self, variant: Variant, signals: &Signals) -> Result<Run, NoRun> {
         let files = self.files(variant)?;
         let name = format!(
             "{INSTANCE_PREFIX}{}-{}",
@@ -114,7 +117,7 @@ impl Plan {
         let mut crew = Crew::new();
         let mut line = StatusLine::new(variant.title());
         let watched = match self.start(&mut crew, variant, &name, &files) {
-            Ok(()) => watch(&mut crew, &mut line, interrupt),
+            Ok(()) => watch(&mut crew, &mut line, signals),
             Err(error) => Err(NoRun::Failed(error)),
         };
         line.finish();
@@ -175,7 +178,7 @@ impl Plan {
             )
         };
         let path = |path: &Path| path.to_string_lossy().into_owned();
-        let (card, trace, pictures) = (path(&files.card), path(&files.trace), path(&files.folder));
+        let (card, trace, folder) = (path(&files.card), path(&files.trace), path(&files.folder));
         role(
             "sim",
             "simulator",
@@ -187,12 +190,14 @@ impl Plan {
                 "--task",
                 &self.task,
                 "--pictures",
-                &pictures,
+                &folder,
             ],
         )?;
         role("vla", "policy", &["--card", &card, "--seed", &seed])?;
         role("agents", "agents", &["--card", &card])?;
-        let mut arguments = vec!["--trace", &trace, "--allow-non-rt"];
+        let mut arguments = vec!["--trace", &trace, "--black-box", &folder];
+        // What the machine allows of real time is taken; the cadence tells.
+        arguments.extend(["--allow-non-rt", "--spin-us", SPIN_US]);
         if variant == Variant::PolicyAlone {
             arguments.push("--backbone-only");
         }
@@ -201,11 +206,11 @@ impl Plan {
 }
 
 /// Follows the episode until it is decided.
-fn watch(crew: &mut Crew, line: &mut StatusLine, interrupt: &Interrupt) -> Result<(), NoRun> {
+fn watch(crew: &mut Crew, line: &mut StatusLine, signals: &Signals) -> Result<(), NoRun> {
     let started = Instant::now();
     let mut moved = false;
     loop {
-        if interrupt.asked() {
+        if signals.stop_requested() {
             return Err(NoRun::Interrupted);
         }
         match crew.next()? {

@@ -2,7 +2,10 @@
 
 use std::io::IsTerminal;
 
-use fitmac_core::wire::{EventKind, Route};
+use fitmac_core::{
+    reason,
+    wire::{EventKind, Route},
+};
 use serde::Serialize;
 
 use super::run::{Plan, Run, Variant};
@@ -41,7 +44,7 @@ struct RunSummary {
 struct Interventions {
     /// Times that an execution correction took the arm.
     execution_corrections: u64,
-    /// Times that the target was looked at again.
+    /// Times that the target was looked at again; the first look is none.
     target_corrections: u64,
     /// Queries answered by a correction instead of the policy.
     corrected_queries: u64,
@@ -193,8 +196,10 @@ impl Interventions {
                     found.corrected_queries += 1;
                 }
                 Ok(Route::Pending) => found.corrected_queries += 1,
-                Ok(Route::Target) => found.target_corrections += 1,
-                Ok(Route::Base) | Err(_) => {}
+                Ok(Route::Target) if record.reasons & reason::INITIAL_GROUNDING == 0 => {
+                    found.target_corrections += 1;
+                }
+                Ok(Route::Target | Route::Base) | Err(_) => {}
             }
         }
         found

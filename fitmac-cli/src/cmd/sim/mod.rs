@@ -8,16 +8,13 @@ use std::{path::PathBuf, time::Duration};
 
 use anyhow::Context;
 use fitmac_rt::{
-    clock, endpoint::HarnessEndpoint, instance::Instance, port::Session, transport::Ipc,
+    clock, endpoint::HarnessEndpoint, instance::Instance, port::Session, signals::Signals,
+    transport::Ipc,
 };
 use sim_harness::action::PHYSICS_STEP_S;
 
-use crate::{
-    card::Card,
-    crew::{Interrupt, Report},
-    episode,
-    exit::Exit,
-};
+use super::leave_control_core;
+use crate::{card::Card, crew::Report, episode, exit::Exit};
 use film::Film;
 use plant::Plant;
 
@@ -26,6 +23,10 @@ const STEP_NS: u64 = (PHYSICS_STEP_S * 1e9) as u64;
 /// Further behind the wall clock than this we let simulated time stand still
 /// instead of catching up in a burst, ns.
 const LAG_MAX_NS: u64 = 20_000_000;
+
+/// How long the world goes on after the verdict, in looks of the judge: the
+/// controller hears of it.
+const LOOKS_AFTER: u32 = 10;
 
 /// Arguments of `sim`.
 #[derive(Clone, Debug, clap::Args)]
@@ -37,7 +38,8 @@ const LAG_MAX_NS: u64 = 20_000_000;
 
 The scene is a table; `--perturbation pos` lets the named object and a distractor
 change places. The robot stands until commands come and stops when they cease.
-Ends when the task is done or its steps are used up, or at Ctrl-C.")]
+Says when the task is done or its steps are used up; ends at Ctrl-C, and draws
+the pictures then.")]
 pub(crate) struct Args {
     /// The running system to join.
     #[arg(long, default_value = "default")]
@@ -54,7 +56,8 @@ pub(crate) struct Args {
 
 /// Runs one episode.
 pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
-    let interrupt = Interrupt::listen()?;
+    let signals = Signals::listen()?;
+    leave_control_core();
     let episode = args.episode.draw()?;
     Card::of(&episode.scene, &episode.task.instruction).write(&args.card)?;
     let mut plant = Plant::new(&episode)?;
@@ -64,7 +67,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
         let transport = Ipc::join(&instance)?;
         let mut endpoint = HarnessEndpoint::connect(&transport, Session::start())?;
         Report::Ready.send();
-        live(&mut plant, &mut film, &mut endpoint, &interrupt)?;
+        live(&mut plant, &mut film, &mut endpoint, &signals)?;
     }
     if plant.verdict().is_none() {
         return Ok(Exit::Interrupted);
@@ -81,11 +84,11 @@ fn live(
     plant: &mut Plant,
     film: &mut Film,
     endpoint: &mut HarnessEndpoint<Ipc>,
-    interrupt: &Interrupt,
+    signals: &Signals,
 ) -> anyhow::Result<()> {
     let mut due_ns = clock::now_ns();
-    let mut told = false;
-    while !interrupt.asked() {
+    let mut looks_after = 0;
+    while !signals.stop_requested() {
         let now_ns = wait_until(due_ns);
         if now_ns.saturating_sub(due_ns) > STEP_NS {
             plant.count_late_step();
@@ -99,10 +102,10 @@ fn live(
             endpoint.publish_verifier(now_ns, report)?;
             film.watch(plant);
             Report::Progress(plant.progress()).send();
-        }
-        if plant.verdict().is_some() && !told {
-            told = true;
-            Report::Over.send();
+            looks_after += u32::from(plant.verdict().is_some());
+            if looks_after == LOOKS_AFTER {
+                Report::Over.send();
+            }
         }
         due_ns = due_ns
             .saturating_add(STEP_NS)
