@@ -142,7 +142,11 @@ fn query(session: &Session, n: u64) -> &TraceRecord {
 
 #[test]
 fn every_row_has_its_phase_diagnosis_route_and_state() {
-    for (profile, params) in [("paper", Params::paper()), ("guarded", Params::guarded())] {
+    // The guarded profile begins a long way while it still rises, which saves
+    // queries; but for that it goes through the same rows.
+    let mut guarded = Params::guarded();
+    guarded.recovery.rise_under_way_m = 0.0;
+    for (profile, params) in [("paper", Params::paper()), ("guarded", guarded)] {
         let session = episode(params);
         for (n, step, phase, diagnosis, route, state) in ROWS {
             let r = query(&session, n);

@@ -220,6 +220,7 @@ impl Params {
         params.recovery.align_yaw_rad = 0.0;
         params.gate.plan_confidence = 0.0;
         params.tracking.gain = 1.0;
+        params.recovery.rise_under_way_m = 0.0;
         params
     }
 

@@ -278,6 +278,8 @@ stage! {
         hover_m: f64 = 0.10 in 0.01..=0.5, "m";
         /// Height of the underside above the destination while carrying.
         carry_m: f64 = 0.12 in 0.01..=0.5, "m";
+        /// Part of the rise to the carry height that a long way may be begun with; 0 raises first and travels then, as in Table 19.
+        rise_under_way_m: f64 = 0.07 in 0.0..=0.3, "m";
         /// Height of the fingertips above everything else on the way to the hover point.
         clearance_m: f64 = 0.05 in 0.0..=0.3, "m";
         /// Hover reached, horizontally.

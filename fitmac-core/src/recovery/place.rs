@@ -22,8 +22,6 @@ const RETREAT_QUERIES: u32 = 8;
 const TOUCH_M: f64 = 0.005;
 /// A way on which the arm rises faster than it arrives, m.
 const LONG_WAY_M: f64 = 0.20;
-/// How much of the rise may be left to such a way, m.
-const RISE_UNDER_WAY_M: f64 = 0.07;
 /// Change of the carried object's place in the hand that is a drop, m.
 const SLIP_M: f64 = 0.06;
 
@@ -154,7 +152,7 @@ impl Place {
         let left_m = carry_z - z;
         // On a long way the rest of the rise is made under way.
         let may_travel = left_m <= scene.params.recovery.hover_z_m
-            || (d.distance_xy_m > LONG_WAY_M && left_m < RISE_UNDER_WAY_M);
+            || (d.distance_xy_m > LONG_WAY_M && left_m < scene.params.recovery.rise_under_way_m);
         if may_travel || scene.is_blocked() {
             return self.go(Step::MoveAbove);
         }
