@@ -305,6 +305,13 @@ impl Instance {
         }
         let _ = fs::remove_dir_all(self.root.join(SERVICES));
         let _ = fs::remove_file(self.root.join(MEMBERS));
+        // A controller that was killed leaves its lock file; one that lives holds it.
+        let controller = self.root.join(CONTROLLER);
+        if let Ok(file) = File::open(&controller)
+            && flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok()
+        {
+            let _ = fs::remove_file(&controller);
+        }
         // Only if nothing of the user's is in it.
         let _ = fs::remove_dir(&self.root);
     }
