@@ -6,7 +6,7 @@ use crate::scene::{PlacedObject, Scene};
 /// How far below its top a tall thing is taken, m.
 const BELOW_TOP_M: f64 = 0.020;
 /// The lowest the tool centre point goes above the surface, m: the pads reach 9 mm further.
-const LOWEST_M: f64 = 0.012;
+pub(crate) const LOWEST_M: f64 = 0.012;
 /// How deep the pads reach below a rim, m.
 const RIM_DEPTH_M: f64 = 0.020;
 /// More room than this around the fingers makes no difference, m.

@@ -12,6 +12,7 @@ pub mod action;
 pub mod agents;
 pub mod backbone;
 pub mod error;
+pub mod evaluation;
 mod geometry;
 pub mod grasp;
 pub mod grounding;

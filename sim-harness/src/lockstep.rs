@@ -366,7 +366,9 @@ impl Lockstep {
         for (wire, action) in chunk.actions.iter_mut().zip(&answer.actions) {
             *wire = action.map(|a| a as f32);
         }
-        self.chunks.post(now_ns + late_ns, chunk);
+        for _ in 0..answer.copies {
+            self.chunks.post(now_ns + late_ns, chunk);
+        }
     }
 
     fn state_sample(&self, now_ns: u64) -> StateSample {

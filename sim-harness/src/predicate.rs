@@ -52,6 +52,15 @@ impl Goal {
         }
     }
 
+    /// The same for another object.
+    #[must_use]
+    pub fn with_object(self, object: u16) -> Self {
+        match self {
+            Self::In { container, .. } => Self::In { object, container },
+            Self::On { support, .. } => Self::On { object, support },
+        }
+    }
+
     /// LIBERO's predicate: holds as soon as the object is in its place, held or not.
     #[must_use]
     pub fn holds(self, sim: &Sim) -> bool {

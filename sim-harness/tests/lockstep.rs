@@ -5,7 +5,7 @@ use fitmac_core::message::Command;
 use fitmac_core::params::{Params, Switches};
 use fitmac_core::wire::Route;
 use sim_harness::agents::OracleAgents;
-use sim_harness::backbone::{Memory, Replay, ReplayParams};
+use sim_harness::backbone::Registry;
 use sim_harness::lockstep::{Lockstep, Outcome, Setup};
 use sim_harness::perception::{PerceptionParams, PoseSource};
 use sim_harness::sim::Sim;
@@ -21,12 +21,12 @@ fn setup(seed: u64, swapped: bool, switches: Switches, pose_source: PoseSource) 
             .unwrap();
     }
     let goal = task.goal(&scene).unwrap();
-    let memory = Memory::of(&suite).unwrap();
+    let registry = Registry::embedded().unwrap();
     Setup {
         sim: Sim::new(scene).unwrap(),
         goal,
         instruction: task.instruction.clone(),
-        backbone: Box::new(Replay::new(ReplayParams::openvla_like(), memory)),
+        backbone: registry.get("openvla-like").unwrap().build(&suite).unwrap(),
         agents: Box::new(OracleAgents::new(goal)),
         params: Params {
             switches,
@@ -108,12 +108,12 @@ fn a_displaced_target_is_lost_on_the_policy_and_saved_by_the_controller() {
 #[test]
 fn where_the_policy_succeeds_nothing_is_changed() {
     let alone = run(setup(
-        1001,
+        1002,
         false,
         Switches::BACKBONE_ONLY,
         PoseSource::Truth,
     ));
-    let together = run(setup(1001, false, Switches::FULL, PoseSource::Truth));
+    let together = run(setup(1002, false, Switches::FULL, PoseSource::Truth));
     assert_eq!(alone.outcome, Outcome::Success);
     assert_eq!(together.outcome, Outcome::Success);
     assert_eq!(together.interventions, 0);

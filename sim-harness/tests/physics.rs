@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use sim_harness::action::{Action, WAIT};
-use sim_harness::backbone::{Backbone, Memory, Observation, PointMass, Replay, ReplayParams};
+use sim_harness::backbone::{Observation, PointMass, Registry};
 use sim_harness::object::Library;
 use sim_harness::pose::{Pose, distance_m};
 use sim_harness::predicate::{Goal, Judge, REST_STEPS};
@@ -224,8 +224,8 @@ fn play(suite: &Suite, task: &str, seed: u64, swap: bool) -> (bool, Sim, Goal) {
     let goal = task.goal(&scene).unwrap();
     let mut sim = Sim::new(scene).unwrap();
     let mut judge = Judge::new(goal);
-    let memory = Memory::of(suite).unwrap();
-    let mut policy = Replay::new(ReplayParams::openvla_like(), memory);
+    let registry = Registry::embedded().unwrap();
+    let mut policy = registry.get("openvla-like").unwrap().build(suite).unwrap();
     policy.reset(seed);
     for _ in 0..10 {
         sim.step_policy(&WAIT).unwrap();
@@ -284,8 +284,8 @@ fn chunks_are_equal_for_equal_seeds_and_blind_to_the_text() {
     let suite = Suite::embedded("object").unwrap();
     let sim = Sim::new(object_scene("butter", 3)).unwrap();
     let chunk = |seed: u64, prompt: &str| {
-        let memory = Memory::of(&suite).unwrap();
-        let mut policy = Replay::new(ReplayParams::openvla_like(), memory);
+        let registry = Registry::embedded().unwrap();
+        let mut policy = registry.get("openvla-like").unwrap().build(&suite).unwrap();
         policy.reset(seed);
         policy.infer(&Observation::of(&sim, prompt, 0))
     };

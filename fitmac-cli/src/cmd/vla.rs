@@ -19,7 +19,7 @@ use fitmac_rt::{
     signals::Signals, transport::Ipc,
 };
 use sim_harness::{
-    backbone::{Backbone, Chunk, Memory, Observation, Replay, ReplayParams, SeenObject},
+    backbone::{Chunk, Observation, Registry, SeenObject},
     object::ObjectClass,
     pose::Pose,
     sim::RobotState,
@@ -54,6 +54,9 @@ pub(crate) struct Args {
     /// The suite that the policy was trained on.
     #[arg(long, default_value = "object")]
     suite: String,
+    /// Which surrogate: openvla-like, pi0-like, pi05-like, and controls.
+    #[arg(long, default_value = "openvla-like")]
+    backbone: String,
     /// Draws the policy's noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -64,7 +67,11 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
     let signals = Signals::listen()?;
     leave_control_core();
     let suite = Suite::embedded(&args.suite).map_err(|error| BadInput(error.to_string()))?;
-    let mut backbone = Replay::new(ReplayParams::openvla_like(), Memory::of(&suite)?);
+    let registry = Registry::embedded()?;
+    let spec = registry
+        .get(&args.backbone)
+        .map_err(|error| BadInput(error.to_string()))?;
+    let mut backbone = spec.build(&suite)?;
     backbone.reset(args.seed);
     let card = Card::wait_for(&args.card)?;
     let instance = Instance::named(&args.instance)?;

@@ -35,7 +35,16 @@ struct Landmark {
 pub struct Demonstration {
     /// The task's name.
     pub task: String,
+    instruction: String,
     landmarks: Vec<Landmark>,
+    target_label: String,
+    target_colour: [f32; 3],
+    target_half_m: [f64; 3],
+    destination_label: String,
+    /// Height of the working surface in training, m.
+    pub surface_m: f64,
+    /// How far below the target's top the tool was when the gripper closed, m.
+    pub grasp_below_top_m: f64,
     /// Centre of the target in training, m.
     pub target_m: [f64; 3],
     /// Where the tool was when the gripper closed, m.
@@ -81,6 +90,13 @@ impl Demonstration {
         };
         Ok(Self {
             task: task.name.clone(),
+            instruction: task.instruction.clone(),
+            target_label: target.kind.label.clone(),
+            target_colour: target.kind.colour,
+            target_half_m: target.kind.half_extent_m(),
+            destination_label: destination.kind.label.clone(),
+            surface_m: scene.arena.surface_m,
+            grasp_below_top_m: top_m(target) - grasp_m[2],
             landmarks: scene.objects().iter().map(landmark).collect(),
             target_m: target.pose.position_m,
             grasp_m,
@@ -111,6 +127,62 @@ impl Demonstration {
         let total: f64 = self.landmarks.iter().map(missing).sum();
         total / self.landmarks.len().max(1) as f64
     }
+
+    /// Whether a text is the one of training, to the letter.
+    #[must_use]
+    pub fn says(&self, prompt: &str) -> bool {
+        self.instruction == prompt
+    }
+
+    /// Whether the target looks as in training, if it is near its place.
+    #[must_use]
+    pub fn looks_as_trained(&self, seen: &[SeenObject]) -> bool {
+        let Some(target) = self.nearest_like_target(seen) else {
+            return true;
+        };
+        if distance_xy_m(target.pose.position_m, self.target_m) > MISPLACED_M {
+            return true;
+        }
+        let colour = |i: usize| (target.colour[i] - self.target_colour[i]).abs() < 0.05;
+        let size = |i: usize| (target.half_extent_m[i] / self.target_half_m[i] - 1.0).abs() < 0.02;
+        (0..3).all(|i| colour(i) && size(i))
+    }
+
+    /// The object of the target's name nearest to where the target was in training.
+    #[must_use]
+    pub fn nearest_like_target<'a>(&self, seen: &'a [SeenObject]) -> Option<&'a SeenObject> {
+        self.by_distance(seen, &self.target_label)
+            .into_iter()
+            .next()
+    }
+
+    /// The destination, wherever it is.
+    #[must_use]
+    pub fn destination_among<'a>(&self, seen: &'a [SeenObject]) -> Option<&'a SeenObject> {
+        seen.iter().find(|o| o.label == self.destination_label)
+    }
+
+    /// The object that a text names, read as a model would that knows the objects' names: the one
+    /// whose name comes first; of several of that name the one of training, or another one if the
+    /// text says "not".
+    #[must_use]
+    pub fn named_by<'a>(&self, prompt: &str, seen: &'a [SeenObject]) -> Option<&'a SeenObject> {
+        let named = seen
+            .iter()
+            .filter_map(|o| prompt.find(&o.label).map(|at| (at, o)))
+            .min_by_key(|(at, _)| *at)?
+            .1;
+        let alike = self.by_distance(seen, &named.label);
+        let index = usize::from(prompt.contains(" not ") && alike.len() > 1);
+        alike.get(index).copied()
+    }
+
+    fn by_distance<'a>(&self, seen: &'a [SeenObject], label: &str) -> Vec<&'a SeenObject> {
+        let away = |o: &SeenObject| distance_xy_m(o.pose.position_m, self.target_m);
+        let mut alike: Vec<_> = seen.iter().filter(|o| o.label == label).collect();
+        alike.sort_by(|a, b| away(a).total_cmp(&away(b)));
+        alike
+    }
 }
 
 fn top_m(object: &PlacedObject) -> f64 {
@@ -125,6 +197,7 @@ fn carried_depth_m(object: &PlacedObject) -> f64 {
 /// All that was learnt.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Memory {
+    suite: String,
     demonstrations: Vec<Demonstration>,
 }
 
@@ -145,7 +218,16 @@ impl Memory {
                 "it has no task",
             ));
         }
-        Ok(Self { demonstrations })
+        Ok(Self {
+            suite: suite.name.clone(),
+            demonstrations,
+        })
+    }
+
+    /// The suite that it was trained on.
+    #[must_use]
+    pub fn suite(&self) -> &str {
+        &self.suite
     }
 
     /// The demonstration whose scene resembles the observed one most; ties go to the first.

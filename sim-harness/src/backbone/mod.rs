@@ -4,13 +4,19 @@
 //! and answers with a chunk of actions. It is never told which perturbation made the scene. Every
 //! table that comes of one says "surrogate".
 
+mod chaos;
+mod control;
 mod memory;
 mod motion;
+mod registry;
 mod replay;
 
+pub use chaos::{Chaos, Fault};
+pub use control::{Hold, Random};
 pub use memory::{Demonstration, Memory};
 pub use motion::PointMass;
-pub use replay::{Replay, ReplayParams};
+pub use registry::{Registry, Spec};
+pub use replay::{BySuite, EndWeights, Latency, Replay, ReplayParams};
 
 use crate::action::Action;
 use crate::object::ObjectClass;
@@ -84,6 +90,8 @@ pub struct Chunk {
     pub actions: Vec<Action>,
     /// How long the inference took, s. Simulated: nothing waits for it here.
     pub latency_s: f64,
+    /// How often the answer is sent: once, unless the transport is made to fail.
+    pub copies: u32,
 }
 
 /// A policy that answers observations with chunks of actions.

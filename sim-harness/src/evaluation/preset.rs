@@ -1,0 +1,194 @@
+//! The paper's experiments as named grids.
+
+use super::config::{Config, Knowledge, Profile, Vision};
+use super::grid::Grid;
+use crate::error::SimError;
+use crate::perturb::{Level, Perturbation};
+
+/// The paper's seeds: for reports only.
+pub const PAPER_SEEDS: [u64; 5] = [7, 11, 13, 17, 23];
+/// Seeds for choosing parameters: never in a report.
+pub const TUNING_SEEDS: std::ops::RangeInclusive<u64> = 1_000..=9_999;
+
+/// An experiment of the paper, or one that we added.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preset {
+    /// Tables 1 and 2: ten cells, 50 episodes a task, the base policy beside it.
+    Main,
+    /// Tables 5 and 6: three backbones.
+    Backbones,
+    /// Tables 3, 9 and 10: what each module is worth.
+    Ablation,
+    /// Tables 4 and 11 to 18: four parameters.
+    Sweeps,
+    /// Tables 7 and 8: five seeds.
+    Seeds,
+    /// Ours: nominal scenes, all backbones, both profiles, and what the controller costs there.
+    Harm,
+    /// Ours: how far a target can be displaced before the policy alone loses it.
+    Displacement,
+    /// A few episodes of everything, to see that it works.
+    Smoke,
+}
+
+/// The surrogates that stand for the paper's backbones.
+const BACKBONES: [&str; 3] = ["openvla-like", "pi0-like", "pi05-like"];
+/// The paper's sweeps: parameter and values, the default left out.
+const SWEEPS: [(&str, &[&str]); 4] = [
+    ("gate.failure_streak", &["2", "4"]),
+    ("gate.confidence", &["0.10", "0.18"]),
+    ("gate.rescue_min_step", &["8", "16"]),
+    ("horizon.execution_steps", &["1", "3", "4"]),
+];
+
+impl Preset {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::Main,
+        Self::Backbones,
+        Self::Ablation,
+        Self::Sweeps,
+        Self::Seeds,
+        Self::Harm,
+        Self::Displacement,
+        Self::Smoke,
+    ];
+
+    /// The name that command lines use.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Main => "main",
+            Self::Backbones => "backbones",
+            Self::Ablation => "ablation",
+            Self::Sweeps => "sweeps",
+            Self::Seeds => "seeds",
+            Self::Harm => "harm",
+            Self::Displacement => "displacement",
+            Self::Smoke => "smoke",
+        }
+    }
+
+    /// The preset of that name.
+    ///
+    /// # Errors
+    /// [`SimError::Unknown`], listing the names that exist.
+    pub fn by_name(name: &str) -> Result<Self, SimError> {
+        let names = Self::ALL.iter().map(|p| p.name());
+        Self::ALL
+            .into_iter()
+            .find(|p| p.name() == name)
+            .ok_or_else(|| SimError::unknown("preset", name, names))
+    }
+
+    /// Its grid.
+    ///
+    /// # Errors
+    /// Only if a parameter of a sweep no longer exists, which a test rules out.
+    pub fn grid(self) -> Result<Grid, SimError> {
+        let owned = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect();
+        let configs = |names: &[&str]| -> Result<Vec<Config>, SimError> {
+            names.iter().map(|n| Config::parse(n)).collect()
+        };
+        let five = || {
+            Perturbation::ALL[1..]
+                .iter()
+                .map(|p| (*p, Level::Standard))
+                .collect::<Vec<_>>()
+        };
+        let usual = Grid {
+            suites: owned(&["object", "spatial"]),
+            tasks: Vec::new(),
+            perturbations: five(),
+            backbones: owned(&BACKBONES[..1]),
+            configs: configs(&["base", "full"])?,
+            profiles: vec![Profile::Guarded],
+            visions: vec![Vision::Modelled],
+            knowledges: vec![Knowledge::Agents],
+            seeds: vec![PAPER_SEEDS[0]],
+            episodes: 10,
+        };
+        let nominal = vec![(Perturbation::None, Level::Standard)];
+        Ok(match self {
+            Self::Main => Grid {
+                perturbations: [nominal, five()].concat(),
+                episodes: 50,
+                ..usual
+            },
+            Self::Backbones => Grid {
+                backbones: owned(&BACKBONES),
+                ..usual
+            },
+            Self::Ablation => Grid {
+                configs: configs(&[
+                    "base",
+                    "full",
+                    "wo-target",
+                    "wo-execution",
+                    "wo-hard-pick",
+                    "wo-hard-place",
+                ])?,
+                backbones: owned(&[BACKBONES[0], BACKBONES[2]]),
+                ..usual
+            },
+            Self::Sweeps => {
+                let mut swept = configs(&["full"])?;
+                for (parameter, values) in SWEEPS {
+                    for value in values {
+                        swept.push(Config::parse(&format!("full+{parameter}={value}"))?);
+                    }
+                }
+                Grid {
+                    configs: swept,
+                    ..usual
+                }
+            }
+            Self::Seeds => Grid {
+                seeds: PAPER_SEEDS.to_vec(),
+                ..usual
+            },
+            Self::Harm => Grid {
+                perturbations: [nominal, five()].concat(),
+                backbones: owned(&[&BACKBONES[..], &["oracle"]].concat()),
+                profiles: Profile::ALL.to_vec(),
+                ..usual
+            },
+            Self::Displacement => {
+                let steps = [0.02, 0.04, 0.06, 0.08, 0.10, 0.15, 0.20, 0.30];
+                let levels = steps.map(|d| (Perturbation::Pos, Level::DisplacedM(d)));
+                Grid {
+                    suites: owned(&["object"]),
+                    perturbations: [nominal, levels.to_vec()].concat(),
+                    ..usual
+                }
+            }
+            Self::Smoke => Grid {
+                perturbations: [nominal, five()].concat(),
+                seeds: vec![*TUNING_SEEDS.start()],
+                episodes: 1,
+                ..usual
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_have_the_papers_numbers_of_episodes() {
+        let count = |p: Preset| p.grid().unwrap().episodes().unwrap().len();
+        // Suites, tasks, cells, episodes, configurations.
+        assert_eq!(count(Preset::Main), 2 * 10 * 6 * 50 * 2);
+        assert_eq!(count(Preset::Backbones), 2 * 10 * 5 * 10 * 2 * 3);
+        assert_eq!(count(Preset::Ablation), 2 * 10 * 5 * 10 * 6 * 2);
+        assert_eq!(count(Preset::Sweeps), 2 * 10 * 5 * 10 * 10);
+        assert_eq!(count(Preset::Seeds), 2 * 10 * 5 * 10 * 2 * 5);
+    }
+
+    #[test]
+    fn reports_and_tuning_share_no_seed() {
+        assert!(PAPER_SEEDS.iter().all(|seed| !TUNING_SEEDS.contains(seed)));
+    }
+}
