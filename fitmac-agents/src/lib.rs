@@ -10,6 +10,7 @@ pub mod canvas;
 pub mod critic;
 pub mod detector;
 pub mod grounder;
+pub mod instructions;
 pub mod model;
 pub mod planner;
 pub mod prompt;

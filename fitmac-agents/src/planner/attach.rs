@@ -2,7 +2,7 @@
 
 use super::clause::Group;
 use super::confidence::Doubt;
-use super::lexer::{Direction, Verb};
+use super::lexer::{Direction, TOWARDS, Verb};
 use super::lexicon;
 use super::phrase::{Noun, Place};
 use super::types::Relation;
@@ -51,8 +51,12 @@ pub(super) fn roles<'a>(
             roles.destination = destination;
             Ok(roles)
         }
-        Verb::Place | Verb::Move | Verb::Slide | Verb::Push if pronoun => place_pronoun(after),
-        Verb::Place | Verb::Move | Verb::Slide | Verb::Push => place_named(after, doubts),
+        Verb::Place | Verb::Leave | Verb::Move | Verb::Slide | Verb::Push if pronoun => {
+            place_pronoun(after)
+        }
+        Verb::Place | Verb::Leave | Verb::Move | Verb::Slide | Verb::Push => {
+            place_named(after, doubts)
+        }
         Verb::Open | Verb::Close | Verb::TurnOn | Verb::TurnOff | Verb::Turn => {
             sources(after, doubts)
         }
@@ -111,6 +115,12 @@ fn place_named<'a>(places: Vec<Place<'a>>, doubts: &mut Vec<Doubt>) -> Result<Ro
                 roles.destination_qualifier = Some(origin);
             }
             roles.destination = Some(goal);
+        }
+        // "On the plate from the stove".
+        (Some(goal), Some(origin), None)
+            if origin.direction == Direction::From && !says_where(&goal) =>
+        {
+            (roles.destination, roles.source) = (Some(goal), Some(origin));
         }
         (Some(goal), Some(mark), None) if mark.marked && !says_where(&goal) => {
             (roles.destination, roles.destination_qualifier) = (Some(goal), Some(mark));
@@ -174,12 +184,18 @@ pub(super) fn settled_relation(
         (None, Some(_)) if place.direction == Direction::Static => {
             Err(Doubt::Unsupported(place.preposition.to_owned()))
         }
-        (None, Some(name)) if lexicon::is_container(name) => {
-            if lexicon::is_open_box(name) {
+        (None, name) => {
+            let container = name.is_some_and(|name| lexicon::is_container(name));
+            let open_box = name.is_some_and(|name| lexicon::is_open_box(name));
+            if open_box || place.preposition == TOWARDS {
                 doubts.push(Doubt::RelationGuess);
             }
-            Ok(Relation::In)
+            let flat = name.is_some_and(|name| name == "tray");
+            Ok(if container && !flat {
+                Relation::In
+            } else {
+                Relation::On
+            })
         }
-        (None, _) => Ok(Relation::On),
     }
 }

@@ -50,7 +50,8 @@ pub(super) fn split<'i, 'a>(items: &'i [Item<'a>]) -> Vec<&'i [Item<'a>]> {
         }
         if next > at {
             let stop = items[at..next].contains(&Item::Stop);
-            let verb = matches!(items.get(next), Some(Item::Verb(..) | Item::Want));
+            let verb = matches!(items.get(next), Some(Item::Verb(..) | Item::Want))
+                || (items[start..at].contains(&Item::Goes) && states(&items[next..]));
             if stop || verb || next == items.len() {
                 clauses.push(&items[start..at]);
                 start = next;
@@ -63,6 +64,12 @@ pub(super) fn split<'i, 'a>(items: &'i [Item<'a>]) -> Vec<&'i [Item<'a>]> {
     clauses.push(&items[start..]);
     clauses.retain(|clause| !clause.is_empty());
     clauses
+}
+
+/// True if another "the milk goes in the basket" begins here.
+fn states(items: &[Item<'_>]) -> bool {
+    let verb = |item: &&Item<'_>| matches!(item, Item::Verb(..) | Item::Goes | Item::Stop);
+    items.iter().find(verb) == Some(&Item::Goes)
 }
 
 fn is_connector(item: &Item<'_>) -> bool {

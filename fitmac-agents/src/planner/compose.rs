@@ -25,6 +25,10 @@ pub(super) struct Composer<'a> {
     subtasks: Vec<Subtask>,
     held: Vec<Held>,
     fronted: Option<Place<'a>>,
+    /// A picked object was never put down.
+    hand_full: bool,
+    /// No clause follows.
+    ended: bool,
     /// Names in the order in which they were mentioned.
     mentions: Vec<String>,
     pub(super) doubts: Vec<Doubt>,
@@ -71,11 +75,29 @@ impl<'a> Composer<'a> {
 
     /// Ends the instruction.
     pub(super) fn finish(mut self) -> Result<(Vec<Subtask>, Vec<Doubt>), Doubt> {
+        self.ended = true;
         self.flush_held()?;
         if self.fronted.is_some() || self.subtasks.is_empty() {
             return Err(Doubt::Incomplete);
         }
+        if self.mixed_directions() {
+            self.doubts.push(Doubt::AmbiguousAttachment);
+        }
         Ok((self.subtasks, self.doubts))
+    }
+
+    /// "The fork to the left and the knife to the right of the plate": "to the
+    /// left" may lack its reference.
+    fn mixed_directions(&self) -> bool {
+        use Relation::{AtBack, AtFront, AtLeft, AtRight, Behind, InFrontOf, LeftOf, RightOf};
+        let some = |set: [Relation; 4]| {
+            let goals = self
+                .subtasks
+                .iter()
+                .filter_map(|step| step.destination.as_ref());
+            goals.into_iter().any(|goal| set.contains(&goal.relation))
+        };
+        some([AtLeft, AtRight, AtFront, AtBack]) && some([LeftOf, RightOf, InFrontOf, Behind])
     }
 
     fn command(
@@ -95,11 +117,21 @@ impl<'a> Composer<'a> {
             };
         }
         let roles = attach::roles(verb, group, fronted, &mut self.doubts)?;
+        let open = |place: &Place<'_>| place.relation.is_none();
+        if verb == Verb::Push && roles.destination.as_ref().is_some_and(open) {
+            // "To the stove": up to it or onto it?
+            self.doubts.push(Doubt::RelationGuess);
+        }
         let action = match verb {
             Verb::Pick | Verb::Find if roles.destination.is_none() => {
                 return self.hold(group, &roles, verb == Verb::Pick);
             }
-            Verb::Pick | Verb::Find | Verb::Place | Verb::Move => Action::PickAndPlace,
+            Verb::Leave if !pronoun || self.held.is_empty() => {
+                return Err(Doubt::Unsupported("leave".to_owned()));
+            }
+            Verb::Pick | Verb::Find | Verb::Place | Verb::Leave | Verb::Move => {
+                Action::PickAndPlace
+            }
             Verb::Slide if goes_in(&roles) => Action::PickAndPlace,
             Verb::Slide | Verb::Push => Action::Push,
             Verb::Open => Action::Open,
@@ -116,6 +148,10 @@ impl<'a> Composer<'a> {
                 // "Them" when one object or none is at hand.
                 if several && self.held.len() < 2 {
                     return Err(Doubt::Unsupported("them".to_owned()));
+                }
+                // "It" when two are at hand: which?
+                if !several && self.held.len() > 1 {
+                    self.doubts.push(Doubt::PronounGuess);
                 }
                 self.place_held(action, &roles)
             }
@@ -147,6 +183,7 @@ impl<'a> Composer<'a> {
     fn hold(&mut self, group: &Group<'a>, roles: &Roles<'a>, picked: bool) -> Result<(), Doubt> {
         self.flush_held()?;
         let source = self.source(roles)?;
+        self.check_shared(group, source.as_ref());
         for target in self.targets(group)? {
             self.mentions.push(target.clone());
             self.held.push(Held {
@@ -162,6 +199,10 @@ impl<'a> Composer<'a> {
         for held in std::mem::take(&mut self.held) {
             if !held.picked {
                 return Err(Doubt::Incomplete);
+            }
+            // Another step while this one is in the hand, or two picks.
+            if std::mem::replace(&mut self.hand_full, true) || !self.ended {
+                self.doubts.push(Doubt::HandFull);
             }
             self.push(Action::Pick, held.target, held.source, None, "")?;
         }
@@ -207,6 +248,7 @@ impl<'a> Composer<'a> {
         self.flush_held()?;
         let source = self.source(roles)?;
         let (destination, prep) = self.destination(roles)?;
+        self.check_shared(group, source.as_ref());
         for target in self.targets(group)? {
             self.push(
                 action,
@@ -217,6 +259,13 @@ impl<'a> Composer<'a> {
             )?;
         }
         Ok(())
+    }
+
+    /// "The bowl and the cup next to the stove": is the bowl there, too?
+    fn check_shared(&mut self, group: &Group<'_>, source: Option<&SpatialPhrase>) {
+        if group.names.len() > 1 && source.is_some() {
+            self.doubts.push(Doubt::AmbiguousAttachment);
+        }
     }
 
     fn fixture(

@@ -1,6 +1,8 @@
 //! Words and multi-word phrases of an instruction.
 
+use super::confidence::Doubt;
 use super::lexicon::{self, Entry};
+use super::spelling;
 use super::types::Relation;
 
 /// Way in which a preposition points.
@@ -22,6 +24,9 @@ pub(super) enum Verb {
     Find,
     Place,
     Move,
+    /// "Leave it in the basket": places what is held; of anything else it says
+    /// not to touch it.
+    Leave,
     /// "Slide": a push along the support or a move into a container.
     Slide,
     Push,
@@ -61,9 +66,14 @@ pub(super) enum Item<'a> {
     Stop,
     It,
     Them,
+    /// A word that says nothing here: "please", "up". The parser doesn't see it.
+    Filler,
     /// A word that the grammar must not skip.
     Unsupported(&'a str),
 }
+
+/// The preposition that leaves open how far.
+pub(super) const TOWARDS: &str = "towards";
 
 /// Longest instruction that is read, bytes.
 pub(super) const TEXT_CAP: usize = 1024;
@@ -96,25 +106,30 @@ pub(super) fn normalise(text: &str) -> String {
 }
 
 /// The items of a normalised text.
-pub(super) fn items(text: &str) -> Vec<Item<'_>> {
-    let words: Vec<&str> = text.split_ascii_whitespace().collect();
+pub(super) fn items<'a>(text: &'a str, doubts: &mut Vec<Doubt>) -> Vec<Item<'a>> {
+    let mut words: Vec<&str> = text.split_ascii_whitespace().collect();
+    for word in &mut words {
+        if !lexicon::is_known(word)
+            && let Some(meant) = spelling::meant(word)
+        {
+            doubts.push(Doubt::Spelling((*word).to_owned(), meant));
+            *word = meant;
+        }
+    }
     let mut items = Vec::with_capacity(words.len());
     let mut at = 0;
     while let Some(rest) = words.get(at..).filter(|rest| !rest.is_empty()) {
+        let at_start = items.iter().all(|item| *item == Item::Filler);
         let after_determiner = matches!(items.last(), Some(Item::Determiner));
-        let (item, used) = next_item(rest, after_determiner, items.is_empty());
-        items.extend(item);
+        let (item, used) = next_item(rest, after_determiner, at_start);
+        items.push(item);
         at += used;
     }
     items
 }
 
-/// The item at the head of `words`, if it has a meaning, and the words it takes.
-fn next_item<'a>(
-    words: &[&'a str],
-    after_determiner: bool,
-    at_start: bool,
-) -> (Option<Item<'a>>, usize) {
+/// The item at the head of `words`, and the words it takes.
+fn next_item<'a>(words: &[&'a str], after_determiner: bool, at_start: bool) -> (Item<'a>, usize) {
     let first = words[0];
     for (phrase, entry) in lexicon::phrases(first) {
         if !matches(words, phrase) {
@@ -137,6 +152,11 @@ fn next_item<'a>(
                 direction: Direction::Static,
                 text: lexicon::surface(phrase),
             },
+            Entry::Towards => Item::Prep {
+                relation: None,
+                direction: Direction::To,
+                text: TOWARDS,
+            },
             Entry::Determiner => Item::Determiner,
             Entry::Of => Item::Of,
             Entry::Possessive => Item::Possessive,
@@ -153,19 +173,19 @@ fn next_item<'a>(
             Entry::It => Item::It,
             Entry::Them => Item::Them,
             // "First put the milk ...": an order that the words keep anyway.
-            Entry::Unsupported if first == "first" && !after_determiner => return (None, used),
-            Entry::Unsupported => Item::Unsupported(first),
+            Entry::Unsupported if first == "first" && !after_determiner => Item::Filler,
+            Entry::Unsupported => Item::Unsupported(lexicon::surface(phrase)),
             Entry::Skip if after_determiner => continue,
-            Entry::Skip => return (None, used),
+            Entry::Skip => Item::Filler,
         };
-        return (Some(item), used);
+        return (item, used);
     }
     let item = if first.bytes().all(|byte| byte.is_ascii_digit()) {
         Item::Unsupported(first)
     } else {
         Item::Word(first)
     };
-    (Some(item), 1)
+    (item, 1)
 }
 
 fn matches(words: &[&str], phrase: &[&str]) -> bool {

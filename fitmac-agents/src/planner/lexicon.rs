@@ -1,6 +1,6 @@
 //! The planner's words.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::LazyLock;
 
 use super::lexer::{Direction, Verb};
@@ -14,6 +14,8 @@ pub(super) enum Entry {
     Prep(Option<Relation>, Direction),
     /// A place without a reference; only where the phrase ends.
     Place(Relation),
+    /// "Towards": to, but how far is left open.
+    Towards,
     Determiner,
     Of,
     Possessive,
@@ -46,12 +48,13 @@ const TABLE: &[(Entry, &str)] = {
         (E::Verb(Verb::Find), "find|locate|select|choose|identify"),
         (
             E::Verb(Verb::Place),
-            "place|put|set|lay|rest|drop|deposit|leave|release|lower|stand|position|store|stow|add|load|toss|insert|pack|stack|arrange|return|hang|mount|fit|place back|put back|dump|slot|park|tuck|plop|situate|put down|set down|place down|lay down|drop off|keep",
+            "place|put|set|lay|rest|drop|deposit|release|lower|stand|position|store|stow|add|load|toss|insert|pack|stack|arrange|return|hang|mount|fit|place back|put back|dump|slot|park|tuck|plop|situate|put down|set down|place down|lay down|drop off|throw|chuck|plunk",
         ),
         (
             E::Verb(Verb::Move),
             "move|transfer|shift|bring|carry|relocate|transport|deliver|pick and place|haul",
         ),
+        (E::Verb(Verb::Leave), "leave|keep"),
         (E::Verb(Verb::Slide), "slide"),
         (E::Verb(Verb::Push), "push|shove|nudge"),
         (E::Verb(Verb::Open), "open|pull open|open up"),
@@ -61,11 +64,11 @@ const TABLE: &[(Entry, &str)] = {
         (E::Verb(Verb::Turn), "turn|switch"),
         (
             E::Prep(Some(R::On), Static),
-            "on|upon|atop|on top of|on the top of|back on|on to the top of|at the top of",
+            "on|upon|atop|right on|straight on|right on top of|on top of|on the top of|back on|on to the top of|at the top of",
         ),
         (
             E::Prep(Some(R::On), To),
-            "onto|on to|over onto|back onto|to the top of|onto the top of|onto top of",
+            "onto|on to|over onto|back onto|right onto|straight onto|right on to|straight on to|to the top of|onto the top of|onto top of",
         ),
         (
             E::Prep(Some(R::On), From),
@@ -73,14 +76,18 @@ const TABLE: &[(Entry, &str)] = {
         ),
         (
             E::Prep(Some(R::In), Static),
-            "in|inside|inside of|within|back in|on the inside of",
+            "in|inside|inside of|within|back in|on the inside of|right in|straight in|right inside",
         ),
-        (E::Prep(Some(R::In), To), "into|back into|to the inside of"),
+        (
+            E::Prep(Some(R::In), To),
+            "into|back into|to the inside of|right into|straight into",
+        ),
         (
             E::Prep(Some(R::In), From),
             "out of|from inside|from inside of|from within|from in|out from|from out of",
         ),
-        (E::Prep(None, To), "to|over to|back to|toward|towards"),
+        (E::Prep(None, To), "to|over to|back to|straight to"),
+        (E::Towards, "toward|towards"),
         (E::Prep(None, From), "from|away off"),
         (E::Prep(None, Static), "at"),
         (
@@ -171,7 +178,7 @@ const TABLE: &[(Entry, &str)] = {
         ),
         (
             E::Determiner,
-            "the|a|an|this|these|those|some|my|your|our|its|that",
+            "the|a|an|this|these|those|some|my|your|our|that",
         ),
         (E::Of, "of"),
         (E::Possessive, "'s"),
@@ -206,7 +213,7 @@ const TABLE: &[(Entry, &str)] = {
         ),
         (
             E::Unsupported,
-            "or|if|unless|until|while|before|after|when|once|don't|do not|do|never|everything|anything|nothing|something|all|every|each|any|two|three|four|five|six|seven|eight|nine|ten|several|many|except|without|instead|same|where|what|who|whose|why|how|other|another|else|neither|nor|either|ignore|disregard|forget|me|us|him|her|you|i|away|there|here|one|ones|first|second|third|fourth|last|again|avoid|rid|but|because|so|not the|rather|twice|as|for|about|against|through|along|around|across|above|than|is|are|was|be|been|will|would|can't|cannot|won't|shouldn't|no|only|whichever|wherever|putting|placing|picking|moving|taking|holding",
+            "grandma|grandpa|mom|mum|dad|someone|somebody|everyone|anyone|human|person|people|user|yourselves|the rest|the others|the remaining|its|own|non|yourself|myself|itself|hand|hands|arm|arms|finger|fingers|or|if|unless|until|while|before|after|when|once|don't|do not|do|never|everything|anything|nothing|something|all|every|each|any|two|three|four|five|six|seven|eight|nine|ten|several|many|except|without|instead|same|where|what|who|whose|why|how|other|another|else|neither|nor|either|ignore|disregard|forget|me|us|him|her|you|i|away|there|here|one|ones|first|second|third|fourth|last|again|avoid|rid|but|because|so|not the|rather|twice|as|for|about|against|through|along|around|across|above|than|is|are|was|be|been|will|would|can't|cannot|won't|shouldn't|no|only|whichever|wherever|putting|placing|picking|moving|taking|holding",
         ),
         (
             E::Skip,
@@ -221,6 +228,7 @@ struct Lexicon {
     phrases: HashMap<&'static str, Phrases>,
     surfaces: HashMap<Vec<&'static str>, &'static str>,
     words: HashMap<&'static str, Word>,
+    known: BTreeSet<&'static str>,
 }
 
 #[derive(Clone, Copy, Default)]
@@ -257,7 +265,11 @@ static LEXICON: LazyLock<Lexicon> = LazyLock::new(|| {
     for colour in COLOURS.split(' ') {
         words.entry(colour).or_default().colour = true;
     }
+    let regions = REGIONS.split(' ');
+    let parts = phrases.values().flatten().flat_map(|(parts, _)| parts);
+    let known = parts.chain(words.keys()).copied().chain(regions).collect();
     Lexicon {
+        known,
         phrases,
         surfaces,
         words,
@@ -274,6 +286,16 @@ pub(super) fn surface(phrase: &[&'static str]) -> &'static str {
     LEXICON.surfaces.get(phrase).copied().unwrap_or_default()
 }
 
+/// True if the planner has the word in any place.
+pub(super) fn is_known(text: &str) -> bool {
+    LEXICON.known.contains(text) || singular(text).is_some_and(|stem| LEXICON.known.contains(stem))
+}
+
+/// All words that the planner has in any place, each once.
+pub(super) fn known_words() -> impl Iterator<Item = &'static str> {
+    LEXICON.known.iter().copied()
+}
+
 /// True if a place without a reference may end before this word.
 pub(super) fn ends_place(word: &str) -> bool {
     phrases(word).iter().any(|(parts, entry)| {
@@ -285,6 +307,7 @@ pub(super) fn ends_place(word: &str) -> bool {
                     | Entry::Stop
                     | Entry::Then
                     | Entry::Prep(..)
+                    | Entry::Towards
                     | Entry::Verb(_)
                     | Entry::Skip
             )

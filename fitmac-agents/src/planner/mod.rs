@@ -25,23 +25,30 @@ mod attach;
 mod clause;
 mod compose;
 mod confidence;
+mod learned;
 mod lexer;
 mod lexicon;
 mod phrase;
 mod schema;
+mod shape;
+mod spelling;
 mod types;
 mod vocabulary;
 
 #[cfg(test)]
 mod tests;
 
+pub(crate) use confidence::Experience;
 pub use confidence::{Doubt, confidence};
 pub use schema::{PlannerOutput, SchemaError};
+pub(crate) use shape::Kind as PartKind;
 pub use types::{
     Action, Relation, SUBTASK_CAPACITY, SURE, SpatialPhrase, Subtask, TaskPlan, UNDERSTOOD,
 };
 
 use compose::Composer;
+use lexer::Item;
+use shape::Kind;
 
 /// An instruction that can't be read at all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -76,16 +83,19 @@ pub fn plan(instruction: &str) -> Result<TaskPlan, PlanError> {
         return Err(PlanError::Empty);
     }
     let text = lexer::normalise(instruction);
-    let (subtasks, doubts) = match parse(&text) {
-        Ok(parsed) => parsed,
-        Err(doubts) => {
-            return Ok(TaskPlan::unknown(instruction, confidence(&doubts), doubts));
-        }
-    };
-    let confidence = confidence(&doubts);
-    if confidence < UNDERSTOOD {
-        return Ok(TaskPlan::unknown(instruction, confidence, doubts));
+    let Reading {
+        subtasks,
+        mut doubts,
+        shape,
+    } = read(&text);
+    let familiarity = confidence::familiarity(&shape);
+    if familiarity < FAMILIAR {
+        doubts.push(Doubt::UnfamiliarShape((familiarity * 100.0) as u8));
     }
+    let confidence = confidence(&doubts);
+    let Some(subtasks) = subtasks.filter(|_| confidence >= UNDERSTOOD) else {
+        return Ok(TaskPlan::unknown(instruction, confidence, doubts));
+    };
     let canonical_instruction = subtasks
         .iter()
         .map(|step| step.text.as_str())
@@ -99,10 +109,44 @@ pub fn plan(instruction: &str) -> Result<TaskPlan, PlanError> {
     })
 }
 
-fn parse(text: &str) -> Result<(Vec<Subtask>, Vec<Doubt>), Vec<Doubt>> {
-    let items = lexer::items(text);
+/// Familiarity above which it is no doubt.
+const FAMILIAR: f64 = 0.95;
+
+/// What the grammar makes of a text, before any confidence.
+pub(crate) struct Reading {
+    /// The steps; none if there is no reading.
+    pub(crate) subtasks: Option<Vec<Subtask>>,
+    pub(crate) doubts: Vec<Doubt>,
+    pub(crate) shape: Vec<Kind>,
+}
+
+/// Reads a text as it was typed.
+pub(crate) fn read_text(text: &str) -> Reading {
+    read(&lexer::normalise(text))
+}
+
+/// Reads a normalised text.
+fn read(text: &str) -> Reading {
     let mut composer = Composer::default();
-    for clause in clause::split(&items) {
+    let mut items = lexer::items(text, &mut composer.doubts);
+    let shape = shape::shape(&items);
+    items.retain(|item| *item != Item::Filler);
+    let (subtasks, doubts) = match parse(&items, composer) {
+        Ok((subtasks, doubts)) => (Some(subtasks), doubts),
+        Err(doubts) => (None, doubts),
+    };
+    Reading {
+        subtasks,
+        doubts,
+        shape,
+    }
+}
+
+fn parse<'a>(
+    items: &[Item<'a>],
+    mut composer: Composer<'a>,
+) -> Result<(Vec<Subtask>, Vec<Doubt>), Vec<Doubt>> {
+    for clause in clause::split(items) {
         let mut doubts = Vec::new();
         let parsed = clause::parse(clause, &mut doubts);
         composer.doubts.append(&mut doubts);

@@ -87,7 +87,7 @@ impl<'i, 'a> Reader<'i, 'a> {
                 Item::And | Item::Comma | Item::Then => self.connector(&mut elements)?,
                 Item::Verb(..) | Item::Goes => break,
                 Item::Unsupported(word) => return Err(Doubt::Unsupported((*word).to_owned())),
-                Item::Of | Item::Possessive | Item::Want | Item::Stop => {
+                Item::Of | Item::Possessive | Item::Want | Item::Stop | Item::Filler => {
                     return Err(Doubt::Unparsed(format!("{item:?}")));
                 }
             }
@@ -133,9 +133,10 @@ impl<'i, 'a> Reader<'i, 'a> {
             if self.peek() == Some(&Item::Both) {
                 self.advance();
             }
-            let next = self.noun()?;
-            self.check_list(&names, &next, both);
-            names.push(next);
+            names.push(self.noun()?);
+        }
+        if !both {
+            self.check_list(&names);
         }
         Ok((names, both))
     }
@@ -156,10 +157,13 @@ impl<'i, 'a> Reader<'i, 'a> {
         (skip > 0 && name_follows).then_some(skip)
     }
 
-    /// "The salt and pepper shaker" may be one object.
-    fn check_list(&mut self, names: &[Noun], next: &Noun, both: bool) {
+    /// "The salt and pepper shaker" may be one object; three names are a list.
+    fn check_list(&mut self, names: &[Noun]) {
         let determined = |noun: &Noun| matches!(noun, Noun::Name(name) if name.determined);
-        if !both && names.iter().any(determined) && !determined(next) {
+        if let [one, other] = names
+            && determined(one)
+            && !determined(other)
+        {
             self.doubts.push(Doubt::AmbiguousList);
         }
     }
@@ -190,6 +194,10 @@ impl<'i, 'a> Reader<'i, 'a> {
                 self.advance();
                 let whole = self.name()?;
                 check_part(&text)?;
+                if !lexicon::is_noun(text.rsplit(' ').next().unwrap_or(&text)) {
+                    // "A picture of the plate".
+                    return Err(Doubt::Unparsed(text));
+                }
                 text.push_str(" of ");
                 text.push_str(&whole.text);
             }
@@ -226,7 +234,14 @@ impl<'i, 'a> Reader<'i, 'a> {
             return Err(Doubt::Incomplete);
         }
         if !lexicon::is_noun(head) {
-            self.doubts.push(Doubt::UnknownNoun(head.to_owned()));
+            let before = words.len().checked_sub(2).and_then(|at| words.get(at));
+            self.doubts.push(
+                if before.is_some_and(|word| lexicon::is_vocabulary_noun(word)) {
+                    Doubt::TrailingWord(head.to_owned())
+                } else {
+                    Doubt::UnknownNoun(head.to_owned())
+                },
+            );
         }
         for word in words
             .iter()
@@ -289,6 +304,15 @@ impl<'i, 'a> Reader<'i, 'a> {
             }
         }
         settle_centre(&mut place);
+        for noun in &place.references {
+            // "On its side", "by the handle": a part of what?
+            if let Noun::Name(name) = noun
+                && !name.text.contains(" of ")
+                && lexicon::is_region(&name.text)
+            {
+                return Err(Doubt::Unsupported(name.text.clone()));
+            }
+        }
         if relation == Some(Relation::Between) && place.references.len() < 2 {
             return Err(Doubt::Incomplete);
         }

@@ -10,7 +10,7 @@ pub(super) const MODIFIERS: &str = "black white red green blue yellow orange pur
 pub(super) const CONTAINERS: &str = "basket bowl drawer compartment bin microwave crate container oven fridge refrigerator sink bag caddy jar mug cup pot pan bucket trash garbage cupboard hamper carton";
 
 /// Regions of an object: no objects of their own.
-pub(super) const REGIONS: &str = "top bottom side edge corner front back rear left right middle center centre area region zone section spot rim surface inside outside end half";
+pub(super) const REGIONS: &str = "handle knob top bottom side edge corner front back rear left right middle center centre area region zone section spot rim surface inside outside end half";
 
 /// Names joined by "and" that are one object.
 pub(super) const COMPOUNDS: &[&str] = &["macaroni and cheese", "mac and cheese"];
