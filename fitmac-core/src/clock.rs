@@ -50,13 +50,40 @@ impl StepClock {
     /// pause a new one starts, and missed steps are not made up for.
     pub(crate) fn start_step(&mut self, now_ns: u64, step_ms: u32) {
         let step_ns = ms_to_ns(step_ms);
-        let late = now_ns.saturating_sub(self.step_ends_ns);
-        let begins = if late < step_ns / 2 {
-            self.step_ends_ns
-        } else {
-            now_ns
-        };
+        // A step that a fault starts before the last one was over begins now:
+        // a fault that flickers must not push the grid into the future.
+        let on_grid = now_ns
+            .checked_sub(self.step_ends_ns)
+            .is_some_and(|late| late < step_ns / 2);
+        let begins = if on_grid { self.step_ends_ns } else { now_ns };
         let begins = if begins == 0 { now_ns } else { begins };
         self.step_ends_ns = begins.saturating_add(step_ns);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    #[test]
+    fn steps_that_are_cut_short_do_not_push_the_grid_ahead() {
+        let mut clock = StepClock::new();
+        for cut in 0..100 {
+            clock.start_step((1000 + cut) * MS, 50);
+        }
+        assert!(!clock.is_due(1148 * MS));
+        assert!(clock.is_due(1149 * MS));
+    }
+
+    #[test]
+    fn steps_in_a_row_keep_the_grid_and_a_pause_starts_a_new_one() {
+        let mut clock = StepClock::new();
+        clock.start_step(1000 * MS, 50);
+        clock.start_step(1060 * MS, 50);
+        assert!(!clock.is_due(1099 * MS) && clock.is_due(1100 * MS));
+        clock.start_step(1130 * MS, 50);
+        assert!(!clock.is_due(1179 * MS) && clock.is_due(1180 * MS));
     }
 }

@@ -9,6 +9,13 @@
 
 mod corrupt;
 mod draw;
+mod run;
+mod seen;
+mod watch;
+
+pub use run::{Controls, Failure, Run, Summary, sweep};
+pub use seen::{Glimpse, Seen};
+pub use watch::{Broken, Watch};
 
 use fitmac_core::{
     message::{
@@ -23,6 +30,9 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::world::{Agent, Policy, Scene, World};
 use draw::Rates;
+
+/// How long policy and agents take to answer once the faults are over, ns.
+const ANSWER_NS: u64 = 5_000_000;
 
 /// What the controller is told in one tick.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -121,6 +131,19 @@ impl Swarm {
     #[must_use]
     pub const fn world(&self) -> &World {
         &self.world
+    }
+
+    /// Ends all faults: messages arrive whole and in time, everything is seen,
+    /// and who is asked answers soon and honestly. What the policy is able to
+    /// do stays as it is.
+    pub fn calm(&mut self) {
+        self.rates = Rates::default();
+        self.world.hidden.clear();
+        self.world.plant.drop_above_m = None;
+        (self.frozen_for, self.deaf_for, self.stopped_for) = (0, 0, 0);
+        self.policy.delay_ns = self.policy.delay_ns.min(ANSWER_NS);
+        self.agent.answers = Agent::knowing(&self.scene).answers;
+        self.agent.delay_ns = ANSWER_NS;
     }
 
     fn hits(&mut self, rate: f64) -> bool {
@@ -311,11 +334,12 @@ impl Swarm {
 
     fn request(&mut self) -> u8 {
         let over = self.hits(if self.scene.is_done(&self.world) {
-            0.02
+            self.rates.episode_ends_done
         } else {
-            0.0007
+            self.rates.episode_ends
         });
-        if over || self.stopped_for > 20 || self.hits(self.rates.reset) {
+        let stopped = self.stopped_for > 20 && self.rates.episode_ends > 0.0;
+        if over || stopped || self.hits(self.rates.reset) {
             self.stopped_for = 0;
             self.begin_again();
             return Request::Reset.code();

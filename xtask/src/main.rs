@@ -56,6 +56,8 @@ enum Command {
     Install(cmd::install::Args),
     /// Write the documents that the code prints, or check them.
     Docs(cmd::docs::Args),
+    /// Run the core under faults drawn from seeds; a failure names its seed.
+    Swarm(cmd::swarm::Args),
     /// Say what the machine lacks to build and test.
     Doctor(cmd::doctor::Args),
 }
@@ -71,6 +73,7 @@ fn main() -> ExitCode {
         Command::Bench(args) => cmd::bench::run(&workspace, &args),
         Command::Install(args) => cmd::install::run(&workspace, &args),
         Command::Docs(args) => cmd::docs::run(&workspace, &args),
+        Command::Swarm(args) => cmd::swarm::run(&workspace, &args),
         Command::Doctor(args) => cmd::doctor::run(&workspace, &args),
     };
     match result {

@@ -129,8 +129,9 @@ impl Controller {
         state.subtask = Subtask::fresh(0, epoch);
         state.episode.restart();
         state.verdicts.forget();
-        state.grounding.keep_only(0);
-        state.chunk.discard();
+        state.robot.number_afresh();
+        state.grounding.start_afresh();
+        state.chunk.start_afresh();
         state.queue.clear();
         state.ladder = Ladder::new();
         state.turn = Turn::Settling(self.params.get().clock.settle_steps);

@@ -101,6 +101,16 @@ impl ChunkIntake {
         self.answer = Answer::None;
     }
 
+    /// A new episode: what was asked is void, what was refused before is no
+    /// longer held against the policy, and its numbers may begin anew. (An old
+    /// chunk is still refused: it answers another question.)
+    pub(crate) fn start_afresh(&mut self) {
+        self.discard();
+        self.session = None;
+        self.refused_in_a_row = 0;
+        self.equal_in_a_row = 0;
+    }
+
     /// Asks, unless a question is open or answered. An unanswered one is
     /// repeated, under its number, after `chunk.hold_after_ms`.
     pub(crate) fn ask(
@@ -227,9 +237,11 @@ impl ChunkIntake {
             Some(_) => {}
             None => self.session = Some(chunk.session),
         }
-        self.last_sequence = chunk.sequence;
         check_form(params, chunk)?;
         check_age(params, now_ns, chunk)?;
+        // The number of a broken chunk counts for nothing: taken at its word,
+        // a corrupt one would shut out every sound chunk that follows.
+        self.last_sequence = chunk.sequence;
         let question = self.question.ok_or(Refusal::Query)?;
         if chunk.subtask != question.query.subtask {
             return Err(Refusal::Subtask);

@@ -50,6 +50,13 @@ impl GroundingIntake {
         self.proposal.take()
     }
 
+    /// A new episode: a proposal stays if it is for the first subtask, and the
+    /// agents' numbers may begin anew.
+    pub(crate) fn start_afresh(&mut self) {
+        self.keep_only(0);
+        self.session = None;
+    }
+
     /// Drops a proposal that is not for `subtask`.
     pub(crate) fn keep_only(&mut self, subtask: u32) {
         if self.proposal.is_some_and(|p| p.subtask != subtask) {
@@ -77,19 +84,24 @@ impl GroundingIntake {
             }
             _ => self.session = Some(record.session),
         }
-        self.last_sequence = record.sequence;
         if let Err(refusal) = validate(params, now_ns, record) {
             return Outcome::Refused(refusal);
         }
+        // As with chunks: the number of a broken record counts for nothing.
+        self.last_sequence = record.sequence;
         if record.subtask != subtask {
             return Outcome::Refused(Refusal::Subtask);
         }
-        let overtaken = self.proposal.is_some_and(|p| record.epoch < p.epoch);
-        if record.epoch < epoch || (overtaken && record.epoch > epoch) {
-            return Outcome::Refused(Refusal::Epoch);
-        }
         if record.epoch == epoch {
             return Outcome::Evidence;
+        }
+        // Wrapping, as with sequence numbers: a corrupt epoch just below zero
+        // must not shut out every later one.
+        let overtaken = self
+            .proposal
+            .is_some_and(|p| is_newer(p.epoch, record.epoch));
+        if overtaken || !is_newer(record.epoch, epoch) {
+            return Outcome::Refused(Refusal::Epoch);
         }
         self.proposal = Some(cleaned(record));
         Outcome::Proposal

@@ -30,6 +30,8 @@ pub struct RobotIntake {
     jumps: u32,
     /// The last sample that was refused as a jump.
     jumped: Option<u64>,
+    /// Session and number of the newest sample; `None` where numbers begin anew.
+    numbered: Option<(u64, u64)>,
 }
 
 impl RobotIntake {
@@ -38,7 +40,14 @@ impl RobotIntake {
             latest: None,
             jumps: 0,
             jumped: None,
+            numbered: None,
         }
+    }
+
+    /// A new episode: whatever number the next sample has, it is taken. A
+    /// corrupt number may have shut out every sound one until now.
+    pub(crate) fn number_afresh(&mut self) {
+        self.numbered = None;
     }
 
     /// The newest accepted sample.
@@ -59,12 +68,12 @@ impl RobotIntake {
         now_ns: u64,
         sample: &StateSample,
     ) -> Outcome {
-        let restarted = match &self.latest {
+        let restarted = match self.numbered {
             None => true,
-            Some(last) if last.session != sample.session => true,
-            Some(last) if last.sequence == sample.sequence => return Outcome::Duplicate,
+            Some((session, _)) if session != sample.session => true,
+            Some((_, last)) if last == sample.sequence => return Outcome::Duplicate,
             Some(_) if self.jumped == Some(sample.sequence) => return Outcome::Duplicate,
-            Some(last) if !is_newer(sample.sequence, last.sequence) => {
+            Some((_, last)) if !is_newer(sample.sequence, last) => {
                 return Outcome::Refused(Refusal::Sequence);
             }
             Some(_) => false,
@@ -80,6 +89,7 @@ impl RobotIntake {
         }
         self.jumps = 0;
         self.jumped = None;
+        self.numbered = Some((sample.session, sample.sequence));
         let kept = self.latest.insert(*sample);
         // Unused slots may hold anything; a snapshot must equal itself.
         let used = kept.object_count as usize;

@@ -24,7 +24,7 @@ fn odd(rng: &mut ChaCha8Rng) -> f64 {
 pub(super) fn state(rng: &mut ChaCha8Rng, state: &mut StateSample) {
     let axis = rng.random_range(0..3);
     let slot = rng.random_range(0..4);
-    match rng.random_range(0..16) {
+    match rng.random_range(0..17) {
         0 => state.ee_position_m[axis] = odd(rng),
         1 => state.ee_orientation[slot] = odd(rng),
         2 => state.ee_velocity_m_s[axis] = odd(rng),
@@ -39,7 +39,8 @@ pub(super) fn state(rng: &mut ChaCha8Rng, state: &mut StateSample) {
         11 => state.object_count = rng.random_range(0..50),
         12 => state.sequence = state.sequence.wrapping_sub(rng.random_range(0..5)),
         13 => state.session = rng.random_range(0..3),
-        14 => state.stamp_ns = state.stamp_ns.wrapping_add(rng.random_range(0..20_000_000)),
+        14 => state.sequence = rng.random(),
+        15 => state.stamp_ns = state.stamp_ns.wrapping_add(rng.random_range(0..20_000_000)),
         _ => state.ee_position_m[axis] += rng.random_range(-0.5..0.5),
     }
 }
@@ -47,7 +48,7 @@ pub(super) fn state(rng: &mut ChaCha8Rng, state: &mut StateSample) {
 pub(super) fn chunk(rng: &mut ChaCha8Rng, chunk: &mut ActionChunk) {
     let action = rng.random_range(0..8);
     let lane = rng.random_range(0..7);
-    match rng.random_range(0..14) {
+    match rng.random_range(0..15) {
         0 => chunk.actions[action][lane] = odd(rng) as f32,
         1 => chunk.actions[action][lane] *= 3.0,
         2 => chunk.horizon = *[0, 1, 64, 65, u32::MAX].choose(rng).unwrap_or(&0),
@@ -65,14 +66,15 @@ pub(super) fn chunk(rng: &mut ChaCha8Rng, chunk: &mut ActionChunk) {
         9 => chunk.frame = rng.random_range(0..4),
         10 => chunk.gripper = rng.random_range(0..4),
         11 => chunk.observation_ns = chunk.observation_ns.saturating_sub(3_000_000_000),
-        12 => chunk.stamp_ns = chunk.stamp_ns.wrapping_add(20_000_000),
+        12 => chunk.sequence = rng.random(),
+        13 => chunk.stamp_ns = chunk.stamp_ns.wrapping_add(20_000_000),
         _ => chunk.observation_ns = chunk.observation_ns.wrapping_add(20_000_000),
     }
 }
 
 pub(super) fn grounding(rng: &mut ChaCha8Rng, record: &mut GroundingRecord) {
     let axis = rng.random_range(0..3);
-    match rng.random_range(0..14) {
+    match rng.random_range(0..16) {
         0 => record.confidence = odd(rng),
         1 => record.candidate_count = rng.random(),
         2 => record.target = rng.random_range(0..8),
@@ -85,7 +87,9 @@ pub(super) fn grounding(rng: &mut ChaCha8Rng, record: &mut GroundingRecord) {
         9 => record.region_half_extent_m[axis] = odd(rng),
         10 => record.subtask = rng.random_range(0..3),
         11 => record.sequence = record.sequence.wrapping_sub(rng.random_range(0..3)),
-        12 => {
+        12 => record.sequence = rng.random(),
+        13 => record.epoch = record.epoch.wrapping_add(rng.random::<u32>().into()),
+        14 => {
             for candidate in &mut record.candidates {
                 candidate.compatible = rng.random_range(0..3);
             }

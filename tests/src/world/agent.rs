@@ -134,7 +134,7 @@ impl Agent {
             sequence: self.sequence,
             session: 1,
             stamp_ns: now_ns,
-            epoch: request.epoch + 1,
+            epoch: request.epoch.wrapping_add(1),
             subtask: request.subtask,
             prompt_id: u32::from(id),
             target: id,

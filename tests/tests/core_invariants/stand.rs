@@ -1,72 +1,11 @@
 //! What the tests share: sessions and swarms that are watched tick by tick.
 
-use fitmac_core::{
-    Controller, Params, State,
-    message::{Action, ObjectId, Output},
-    wire::{Phase, Route, SubPhase},
-};
+use fitmac_core::{Controller, Params, message::Action};
+pub(crate) use fitmac_tests::swarm::{Glimpse, Seen};
 use fitmac_tests::{
-    swarm::{Swarm, Told},
+    swarm::Swarm,
     world::{Agent, Behaviour, OTHER, Policy, Scene, Session},
 };
-
-/// What was so before the tick.
-pub(crate) struct Glimpse {
-    pub(crate) action: Action,
-    pub(crate) phase: Phase,
-    pub(crate) subtask: u32,
-    pub(crate) target: ObjectId,
-    pub(crate) epoch: u64,
-    pub(crate) pending: bool,
-    pub(crate) budget: u32,
-    pub(crate) activations: u32,
-    pub(crate) since_hand_back: Option<u32>,
-    pub(crate) route: u8,
-    pub(crate) query: u64,
-}
-
-impl Glimpse {
-    pub(crate) fn of(state: &State) -> Self {
-        let subtask = state.subtask();
-        Self {
-            action: *state.action(),
-            phase: subtask.estimator().phase(),
-            subtask: subtask.index(),
-            target: subtask.lock().target(),
-            epoch: subtask.lock().epoch(),
-            pending: subtask.recovery().is_pending(),
-            budget: subtask.recovery().budget(),
-            activations: subtask.recovery().activations(),
-            since_hand_back: subtask.recovery().since_hand_back(),
-            route: state.decision().route.code(),
-            query: state.episode().queries(),
-        }
-    }
-}
-
-/// One tick, from both sides.
-pub(crate) struct Seen<'a> {
-    pub(crate) seed: u64,
-    pub(crate) params: &'a Params,
-    pub(crate) before: &'a Glimpse,
-    pub(crate) told: &'a Told,
-    pub(crate) output: &'a Output,
-    pub(crate) after: &'a State,
-}
-
-impl Seen<'_> {
-    pub(crate) fn sub_phase(&self) -> SubPhase {
-        self.output.command.sub_phase().expect("a known step")
-    }
-
-    /// A recovery's action started in this tick.
-    pub(crate) fn starts_recovery_action(&self) -> bool {
-        self.output.trace.is_some_and(|r| {
-            r.sub_phase != SubPhase::Idle.code()
-                && (r.route == Route::Execution.code() || r.route == Route::Pending.code())
-        })
-    }
-}
 
 /// Seeds of the short form.
 pub(crate) const SEEDS: core::ops::Range<u64> = 0..80;

@@ -7,4 +7,5 @@ pub(crate) mod docs;
 pub(crate) mod doctor;
 pub(crate) mod install;
 pub(crate) mod setup;
+pub(crate) mod swarm;
 pub(crate) mod test;
