@@ -1,1 +1,5 @@
 //! Shared parts of the benchmarks.
+
+pub mod callgrind;
+pub mod peers;
+pub mod rounds;

@@ -2,9 +2,10 @@
 //!
 //! One file a command in [`cmd`]. What the commands share: where things are
 //! ([`workspace`]), Python ([`python`]), MuJoCo's library ([`mujoco`]), the
-//! environment of the test oracles ([`oracles`]) and child processes
-//! ([`process`]).
+//! environment of the test oracles ([`oracles`]), a compiler for bare metal
+//! ([`bare_rust`]) and child processes ([`process`]).
 
+mod bare_rust;
 mod cmd;
 mod mujoco;
 mod oracles;
@@ -52,14 +53,14 @@ enum Command {
     Ci(cmd::ci::Args),
     /// Build and run one benchmark, or list them.
     Bench(cmd::bench::Args),
+    /// Build the core for two targets without an operating system (minutes).
+    BareMetal(cmd::bare_metal::Args),
     /// Build the C library and install it with its headers and package files.
     Install(cmd::install::Args),
     /// Write the documents that the code prints, or check them.
     Docs(cmd::docs::Args),
     /// Run the core under faults drawn from seeds; a failure names its seed.
     Swarm(cmd::swarm::Args),
-    /// Feed the core raw bytes and check every tick (a minute; `--minutes N`).
-    Fuzz(cmd::fuzz::Args),
     /// Say what the machine lacks to build and test.
     Doctor(cmd::doctor::Args),
 }
@@ -73,10 +74,10 @@ fn main() -> ExitCode {
         Command::Test(args) => cmd::test::run(&workspace, &args),
         Command::Ci(args) => cmd::ci::run(&workspace, &args),
         Command::Bench(args) => cmd::bench::run(&workspace, &args),
+        Command::BareMetal(args) => cmd::bare_metal::run(&workspace, &args),
         Command::Install(args) => cmd::install::run(&workspace, &args),
         Command::Docs(args) => cmd::docs::run(&workspace, &args),
         Command::Swarm(args) => cmd::swarm::run(&workspace, &args),
-        Command::Fuzz(args) => cmd::fuzz::run(&workspace, &args),
         Command::Doctor(args) => cmd::doctor::run(&workspace, &args),
     };
     match result {

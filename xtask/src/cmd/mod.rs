@@ -1,11 +1,11 @@
 //! The commands, one a file.
 
+pub(crate) mod bare_metal;
 pub(crate) mod bench;
 pub(crate) mod ci;
 pub(crate) mod demo;
 pub(crate) mod docs;
 pub(crate) mod doctor;
-pub(crate) mod fuzz;
 pub(crate) mod install;
 pub(crate) mod setup;
 pub(crate) mod swarm;

@@ -1,0 +1,52 @@
+//! Timing side by side: in every round each contestant does the same batch, one after the other
+//! on one core, so that whatever else the machine does falls on all of them alike.
+
+use std::time::Instant;
+
+use anyhow::Context;
+use rustix::thread::{CpuSet, sched_getcpu, sched_setaffinity};
+
+/// Times of one contestant, per call.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Times {
+    /// The best round, in nanoseconds a call.
+    pub best_ns: f64,
+    /// The median round, in nanoseconds a call.
+    pub median_ns: f64,
+}
+
+/// Keeps this thread on the core that it is on.
+///
+/// # Errors
+/// Where the system forbids it.
+pub fn stay_on_one_core() -> anyhow::Result<usize> {
+    let core = sched_getcpu();
+    let mut cores = CpuSet::new();
+    cores.set(core);
+    sched_setaffinity(None, &cores).context("the benchmark cannot be bound to one core")?;
+    Ok(core)
+}
+
+/// Runs every contestant's batch of `calls` calls once a round.
+pub fn race(rounds: usize, calls: usize, contestants: &mut [&mut dyn FnMut()]) -> Vec<Times> {
+    let mut times = vec![Vec::with_capacity(rounds); contestants.len()];
+    // A few rounds before the first that counts: caches and branch predictors.
+    for round in 0..rounds + 5 {
+        for (batch, times) in contestants.iter_mut().zip(&mut times) {
+            let start = Instant::now();
+            batch();
+            let taken = start.elapsed().as_nanos() as f64 / calls as f64;
+            if round >= 5 {
+                times.push(taken);
+            }
+        }
+    }
+    let summary = |mut times: Vec<f64>| {
+        times.sort_by(f64::total_cmp);
+        Times {
+            best_ns: times.first().copied().unwrap_or(f64::NAN),
+            median_ns: times.get(times.len() / 2).copied().unwrap_or(f64::NAN),
+        }
+    };
+    times.into_iter().map(summary).collect()
+}
