@@ -29,6 +29,118 @@ pub struct Faults {
     pub stop_asked: bool,
 }
 
+/// What a fault leads to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reaction {
+    /// One bit of [`reason`].
+    pub reason: u64,
+    /// The mode; a stop is latched until a reset.
+    pub mode: Mode,
+    /// From when on.
+    pub when: &'static str,
+}
+
+const fn reaction(mode: Mode, reason: u64, when: &'static str) -> Reaction {
+    Reaction { reason, mode, when }
+}
+
+/// Every reaction, the mildest first; where several apply the severest wins.
+pub const REACTIONS: &[Reaction] = &[
+    reaction(
+        Mode::Warn,
+        reason::STATE_REFUSED,
+        "a state sample was refused",
+    ),
+    reaction(Mode::Warn, reason::STATE_JUMP, "the end effector jumped"),
+    reaction(Mode::Warn, reason::CHUNK_REFUSED, "a chunk was refused"),
+    reaction(
+        Mode::Warn,
+        reason::POLICY_RESTARTED,
+        "the policy's session changed",
+    ),
+    reaction(
+        Mode::Warn,
+        reason::POLICY_FROZEN,
+        "`chunk.frozen_chunks` equal chunks in a row",
+    ),
+    reaction(
+        Mode::Warn,
+        reason::GROUNDING_REFUSED,
+        "a grounding record or a plan was refused",
+    ),
+    reaction(Mode::Warn, reason::TIME_FAULT, "time ran backwards"),
+    reaction(
+        Mode::Warn,
+        reason::ACTION_CLAMPED,
+        "the policy left the action box",
+    ),
+    reaction(
+        Mode::Warn,
+        reason::LIMITED,
+        "the last filter changed the command",
+    ),
+    reaction(
+        Mode::Hold,
+        reason::NO_STATE,
+        "no state sample was ever accepted",
+    ),
+    reaction(
+        Mode::Hold,
+        reason::STATE_STALE,
+        "state older than `state.hold_age_ms`",
+    ),
+    reaction(
+        Mode::Hold,
+        reason::NO_CHUNK,
+        "first answer later than `chunk.hold_after_ms`",
+    ),
+    reaction(
+        Mode::Hold,
+        reason::STARVED,
+        "answer later than `chunk.hold_after_ms`",
+    ),
+    reaction(
+        Mode::Hold,
+        reason::CHUNK_REFUSALS,
+        "`chunk.refusals_hold` broken chunks in a row",
+    ),
+    reaction(
+        Mode::Hold,
+        reason::COMMAND_NOT_APPLIED,
+        "nothing applied for `state.applied_hold_ms`",
+    ),
+    reaction(
+        Mode::Hold,
+        reason::AWAITING_REBIND,
+        "the answer to a rebind request is awaited",
+    ),
+    reaction(
+        Mode::Stop,
+        reason::OPERATOR_STOP,
+        "an operator asked for it",
+    ),
+    reaction(
+        Mode::Stop,
+        reason::TIME_FAULT,
+        "a gap above `clock.gap_stop_ms`",
+    ),
+    reaction(
+        Mode::Stop,
+        reason::STATE_STALE,
+        "state older than `state.stop_age_ms`",
+    ),
+    reaction(
+        Mode::Stop,
+        reason::STARVED,
+        "answer later than `chunk.stop_after_ms`",
+    ),
+    reaction(
+        Mode::Stop,
+        reason::CHUNK_REFUSALS,
+        "`chunk.refusals_stop` broken chunks in a row",
+    ),
+];
+
 /// The ladder's memory: a latched stop and its reasons.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ladder {
@@ -145,3 +257,6 @@ impl Applied {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

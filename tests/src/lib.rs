@@ -1,5 +1,8 @@
 //! What crosses crates.
 
+pub mod bytes;
+pub mod docs;
+#[cfg(feature = "programs")]
 pub mod fitmac;
 pub mod invariants;
 pub mod link;

@@ -69,6 +69,25 @@ impl Told {
             request: self.request,
         }
     }
+
+    /// Moves every stamp by `shift_ns`, wrapping: from the world's clock to the
+    /// controller's.
+    pub fn shift(&mut self, shift_ns: u64) {
+        let moved = |t: u64| t.wrapping_add(shift_ns);
+        if let Some(state) = &mut self.state {
+            state.stamp_ns = moved(state.stamp_ns);
+            for object in &mut state.objects {
+                object.stamp_ns = moved(object.stamp_ns);
+            }
+        }
+        if let Some(chunk) = &mut self.chunk {
+            chunk.observation_ns = moved(chunk.observation_ns);
+            chunk.stamp_ns = moved(chunk.stamp_ns);
+        }
+        if let Some(record) = &mut self.grounding {
+            record.stamp_ns = moved(record.stamp_ns);
+        }
+    }
 }
 
 /// A source of ticks.
@@ -164,7 +183,8 @@ impl Swarm {
             critic: self.critic(),
             request: self.request(),
         };
-        self.stamp(&mut told);
+        // The world's clock and the controller's part when time runs backwards.
+        told.shift(self.now_ns.wrapping_sub(self.world.now_ns()));
         self.corrupt(&mut told);
         self.lose_and_repeat(&mut told);
         told
@@ -360,25 +380,6 @@ impl Swarm {
         self.world = fresh;
         self.policy.behaviour = draw::behaviour(&mut self.rng);
         self.agent.answers = draw::answers(&mut self.rng, &self.scene);
-    }
-
-    /// The world's clock and the controller's part when time runs backwards.
-    fn stamp(&self, told: &mut Told) {
-        let shift = self.now_ns.wrapping_sub(self.world.now_ns());
-        let moved = |t: u64| t.wrapping_add(shift);
-        if let Some(state) = &mut told.state {
-            state.stamp_ns = moved(state.stamp_ns);
-            for object in &mut state.objects {
-                object.stamp_ns = moved(object.stamp_ns);
-            }
-        }
-        if let Some(chunk) = &mut told.chunk {
-            chunk.observation_ns = moved(chunk.observation_ns);
-            chunk.stamp_ns = moved(chunk.stamp_ns);
-        }
-        if let Some(record) = &mut told.grounding {
-            record.stamp_ns = moved(record.stamp_ns);
-        }
     }
 
     fn corrupt(&mut self, told: &mut Told) {

@@ -61,6 +61,8 @@ enum Command {
     Docs(cmd::docs::Args),
     /// Run the core under faults drawn from seeds; a failure names its seed.
     Swarm(cmd::swarm::Args),
+    /// Feed the core raw bytes and check every tick (a minute; `--minutes N`).
+    Fuzz(cmd::fuzz::Args),
     /// Say what the machine lacks to build and test.
     Doctor(cmd::doctor::Args),
 }
@@ -78,6 +80,7 @@ fn main() -> ExitCode {
         Command::Install(args) => cmd::install::run(&workspace, &args),
         Command::Docs(args) => cmd::docs::run(&workspace, &args),
         Command::Swarm(args) => cmd::swarm::run(&workspace, &args),
+        Command::Fuzz(args) => cmd::fuzz::run(&workspace, &args),
         Command::Doctor(args) => cmd::doctor::run(&workspace, &args),
     };
     match result {

@@ -4,10 +4,13 @@
 //! Every correction ends: each query costs one unit of a budget that never
 //! grows while the correction runs.
 
+mod edges;
 pub mod geometry;
 mod pick;
 mod place;
 pub mod waypoint;
+
+pub use edges::{EDGES, is_legal};
 
 use kinematics::vector::{self, Vector3};
 
@@ -125,6 +128,15 @@ enum Running {
     Place(Place),
 }
 
+impl Running {
+    const fn sub_phase(&self) -> SubPhase {
+        match self {
+            Self::Pick(pick) => pick.sub_phase(),
+            Self::Place(place) => place.sub_phase(),
+        }
+    }
+}
+
 /// A correction under way.
 #[derive(Clone, Debug, PartialEq)]
 struct Active {
@@ -223,17 +235,9 @@ impl Recovery {
     /// The running correction's step.
     #[must_use]
     pub fn sub_phase(&self) -> SubPhase {
-        match &self.active {
-            None => SubPhase::Idle,
-            Some(Active {
-                running: Running::Pick(pick),
-                ..
-            }) => pick.sub_phase(),
-            Some(Active {
-                running: Running::Place(place),
-                ..
-            }) => place.sub_phase(),
-        }
+        self.active
+            .as_ref()
+            .map_or(SubPhase::Idle, |a| a.running.sub_phase())
     }
 
     /// A policy step went by.
@@ -260,6 +264,7 @@ impl Recovery {
                 )
             }
         };
+        debug_assert!(is_legal(SubPhase::Idle, running.sub_phase()));
         self.activations = self.activations.saturating_add(1);
         // The pick comes first: what the episode has left goes to it.
         let budget = budget.min(episode_left);
@@ -350,7 +355,11 @@ impl Active {
 
     fn run(&mut self, scene: &Scene<'_>) -> Step {
         for _ in 0..STEPS_A_QUERY {
-            match self.advance(scene) {
+            let before = self.running.sub_phase();
+            let flow = self.advance(scene);
+            let now = self.running.sub_phase();
+            debug_assert!(before == now || is_legal(before, now), "{before} to {now}");
+            match flow {
                 Flow::Done(step) => return step,
                 Flow::Again => {}
             }

@@ -195,11 +195,15 @@ fn remember(moved_m: [f64; 2], step_ms: u32, world: &World, scene: &Scene) -> Ve
 fn rollout(task: &Task<'_>, mut world: World, n: usize) -> Vec<Action> {
     let mut task = *task;
     let mut actions = Vec::with_capacity(n);
+    // Who does not look need not imagine.
+    let blind = matches!(task.behaviour, Behaviour::Dithers | Behaviour::Frozen);
     for _ in 0..n {
         let action = act(&task, &world);
-        world.start(&action);
-        for _ in 0..5 {
-            world.advance(u64::from(task.step_ms) * 1_000_000 / 5);
+        if !blind {
+            world.start(&action);
+            for _ in 0..5 {
+                world.advance(u64::from(task.step_ms) * 1_000_000 / 5);
+            }
         }
         task.step += 1;
         actions.push(action);

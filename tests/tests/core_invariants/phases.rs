@@ -8,6 +8,7 @@ use fitmac_core::{
     lock::Destination,
     message::Input,
     phase::{EDGES, is_legal, is_pick, is_place},
+    recovery,
     wire::{
         ActionFrame, ActionSpace, CriticLabel, DestinationKind, Diagnosis, EventKind, GraspClass,
         GripperConvention, Mode, Phase, PlaceRelation, Provenance, Request, Route, SubPhase,
@@ -34,6 +35,55 @@ fn inv_43_the_phase_changes_along_declared_edges_only() {
         }
     });
     assert!(taken.len() > 12, "{taken:?}");
+}
+
+/// The steps that follow from `from` within `edges` edges.
+fn reached(from: SubPhase, edges: u32) -> BTreeSet<SubPhase> {
+    let mut reached = BTreeSet::from([from]);
+    for _ in 0..edges {
+        let next: Vec<_> = recovery::EDGES
+            .iter()
+            .filter(|(a, _)| reached.contains(a))
+            .map(|&(_, b)| b)
+            .collect();
+        reached.extend(next);
+    }
+    reached
+}
+
+/// The core asserts each single change by itself in a build with debug
+/// assertions, as this one; a query may take up to four.
+#[test]
+fn inv_43_a_recovery_steps_along_declared_edges_only() {
+    let mut taken = BTreeSet::new();
+    let mut last = (u64::MAX, SubPhase::Idle);
+    swarms(|seen| {
+        let to = seen.sub_phase();
+        let from = if last.0 == seen.seed {
+            last.1
+        } else {
+            SubPhase::Idle
+        };
+        last = (seen.seed, to);
+        if from != to && to != SubPhase::Idle {
+            let legal = reached(from, 4).contains(&to);
+            assert!(legal, "seed {}: {from} to {to}", seen.seed);
+            taken.insert((from, to));
+        }
+    });
+    assert!(taken.len() > 15, "{taken:?}");
+}
+
+#[test]
+fn inv_43_the_steps_of_a_recovery_are_connected_and_bounded() {
+    assert_eq!(reached(SubPhase::Idle, 20).len(), SubPhase::ALL.len());
+    for &step in SubPhase::ALL {
+        let leaves = recovery::EDGES.iter().any(|&(from, _)| from == step);
+        assert!(leaves || step == SubPhase::Settle, "{step} leads on");
+    }
+    // What was released is not picked up by the same correction.
+    assert!(!reached(SubPhase::ReleaseReady, 20).contains(&SubPhase::ApproachHover));
+    assert!(!reached(SubPhase::Idle, 2).contains(&SubPhase::ReleaseReady));
 }
 
 #[test]

@@ -9,8 +9,22 @@ use crate::{
     workspace::{Workspace, not_writable},
 };
 
-/// Each document, and the arguments of `fitmac` that print it.
-const DOCUMENTS: &[(&str, &[&str])] = &[("docs/parameters.md", &["config", "--reference"])];
+/// Each document, and the arguments of `cargo run` that print it.
+const DOCUMENTS: &[(&str, &[&str])] = &[
+    (
+        "docs/parameters.md",
+        &["--package=fitmac-cli", "--", "config", "--reference"],
+    ),
+    (
+        "docs/state-machine.md",
+        &[
+            "--package=fitmac-tests",
+            "--example=page",
+            "--",
+            "state-machine",
+        ],
+    ),
+];
 
 /// Arguments of `docs`.
 #[derive(clap::Args)]
@@ -50,17 +64,15 @@ pub(crate) fn run(workspace: &Workspace, args: &Args) -> anyhow::Result<()> {
 }
 
 fn print(workspace: &Workspace, arguments: &[&str]) -> anyhow::Result<Vec<u8>> {
-    let mut fitmac = process::cargo(workspace);
-    fitmac
-        .args(["run", "--quiet", "--locked", "--package=fitmac-cli", "--"])
-        .args(arguments);
-    let output = fitmac
+    let mut run = process::cargo(workspace);
+    run.args(["run", "--quiet", "--locked"]).args(arguments);
+    let output = run
         .stderr(Stdio::inherit())
         .output()
         .context("cargo could not be started")?;
     if !output.status.success() {
         bail!(
-            "`fitmac {}` failed ({})",
+            "`cargo run {}` failed ({})",
             arguments.join(" "),
             output.status
         );

@@ -1,6 +1,7 @@
 //! What the core decides.
 
 use fitmac_core::{
+    intake::is_newer,
     lock::Destination,
     message::Command,
     phase::{is_legal, is_pick, is_place},
@@ -78,11 +79,14 @@ pub(super) fn lock(seen: &Seen<'_>) -> Result<(), Broken> {
         "52: a pending correction keeps the lock",
         || format!("{} after {}", lock.target(), before.target),
     )?;
-    require(lock.epoch() >= before.epoch, "54: epochs rise", || {
-        format!("{} after {}", lock.epoch(), before.epoch)
+    let epoch = lock.epoch();
+    let rises = epoch == before.epoch || is_newer(epoch, before.epoch);
+    require(rises, "54: epochs rise, wrapping", || {
+        format!("{epoch} after {}", before.epoch)
     })?;
+    let asked = seen.output.query.map(|q| q.epoch);
     require(
-        seen.output.query.is_none_or(|q| q.epoch <= lock.epoch()),
+        asked.is_none_or(|asked| asked == epoch || is_newer(epoch, asked)),
         "54: a question carries the committed epoch",
         || format!("{:?}", seen.output.query),
     )

@@ -104,8 +104,9 @@ pub(super) fn limits(
     dt_ns: u64,
 ) -> Result<(), Broken> {
     const INVARIANT: &str = "10: the setpoint keeps its limits against the last command";
-    // The first setpoint of all is where the arm stands.
-    if last.reasons & reason::NO_STATE != 0 {
+    // The first setpoint of all is where the arm stands; before it, a hold or a
+    // stop shows the origin.
+    if last.setpoint_position_m == [0.0; 3] {
         return Ok(());
     }
     let dt_s = dt_ns as f64 * 1e-9;
