@@ -156,7 +156,11 @@ pub fn learn(cases: &[Case]) -> String {
             experience.halves += halves;
             experience.total += 1;
         };
-        let names: BTreeSet<_> = reading.doubts.iter().filter_map(Doubt::name).collect();
+        let mut names: BTreeSet<_> = reading.doubts.iter().filter_map(Doubt::name).collect();
+        // The graver doubt explains the unknown noun.
+        if reading.doubts.contains(&Doubt::NothingKnown) {
+            names = BTreeSet::from_iter(Doubt::NothingKnown.name());
+        }
         names
             .into_iter()
             .for_each(|name| count(doubts.entry(name).or_default()));

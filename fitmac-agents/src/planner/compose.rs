@@ -80,6 +80,9 @@ impl<'a> Composer<'a> {
         if self.fronted.is_some() || self.subtasks.is_empty() {
             return Err(Doubt::Incomplete);
         }
+        if !self.subtasks.iter().any(names_something_known) {
+            self.doubts.push(Doubt::NothingKnown);
+        }
         if self.mixed_directions() {
             self.doubts.push(Doubt::AmbiguousAttachment);
         }
@@ -407,6 +410,14 @@ impl<'a> Composer<'a> {
         self.subtasks.push(subtask);
         Ok(())
     }
+}
+
+fn names_something_known(step: &Subtask) -> bool {
+    let phrases = [&step.source, &step.destination].into_iter().flatten();
+    let references = phrases.flat_map(|phrase| &phrase.references);
+    references
+        .chain([&step.target])
+        .any(|name| lexicon::has_known_head(name))
 }
 
 fn goes_in(roles: &Roles<'_>) -> bool {

@@ -28,6 +28,8 @@ use super::shape::Kind;
 pub enum Doubt {
     /// The head of a name isn't in the vocabulary.
     UnknownNoun(String),
+    /// No name in the instruction is in the vocabulary: "close the deal".
+    NothingKnown,
     /// A word that isn't in the vocabulary after one that is: "bowl upright".
     TrailingWord(String),
     /// A word was read as its neighbour in the vocabulary: what was written, how
@@ -100,6 +102,7 @@ impl Doubt {
     pub(crate) fn name(&self) -> Option<&'static str> {
         Some(match self {
             Self::UnknownNoun(_) => "unknown_noun",
+            Self::NothingKnown => "nothing_known",
             Self::TrailingWord(_) => "trailing_word",
             Self::Spelling(..) => "spelling",
             Self::UnknownModifier(_) => "unknown_modifier",
@@ -134,6 +137,7 @@ impl Doubt {
             Self::NoVerb | Self::TrailingWord(_) => learned(),
             Self::UnknownNoun(_)
             | Self::UnknownModifier(_)
+            | Self::NothingKnown
             | Self::Spelling(..)
             | Self::AmbiguousAttachment
             | Self::AmbiguousList

@@ -48,7 +48,7 @@ const TABLE: &[(Entry, &str)] = {
         (E::Verb(Verb::Find), "find|locate|select|choose|identify"),
         (
             E::Verb(Verb::Place),
-            "place|put|set|lay|rest|drop|deposit|release|lower|stand|position|store|stow|add|load|toss|insert|pack|stack|arrange|return|hang|mount|fit|place back|put back|dump|slot|park|tuck|plop|situate|put down|set down|place down|lay down|drop off|throw|chuck|plunk",
+            "place|put|set|lay|rest|drop|deposit|release|lower|stand|position|store|stow|add|load|toss|insert|pack|stack|arrange|return|hang|mount|fit|place back|put back|dump|slot|park|tuck|plop|situate|put down|set down|place down|lay down|drop off|throw|chuck|plunk|pop",
         ),
         (
             E::Verb(Verb::Move),
@@ -176,10 +176,7 @@ const TABLE: &[(Entry, &str)] = {
             E::Place(R::AtCentre),
             "in the middle|at the center|at the centre|in the center|in the centre|from the center|from the centre|from the middle",
         ),
-        (
-            E::Determiner,
-            "the|a|an|this|these|those|some|my|your|our|that",
-        ),
+        (E::Determiner, "the|a|an|this|these|those|some|my|our|that"),
         (E::Of, "of"),
         (E::Possessive, "'s"),
         (
@@ -188,7 +185,7 @@ const TABLE: &[(Entry, &str)] = {
         ),
         (
             E::Relative,
-            "that is|that 's|which is|which 's|that was|which was|that are|which are|that sits|which sits|that stands|that lies|that rests|that has been|located|situated|sitting|standing|lying|resting|placed|positioned|found|kept|sit|sits|stands|lies|rests|currently|which|stored|lie|being",
+            "thats|that is|that 's|which is|which 's|that was|which was|that are|which are|that sits|which sits|that stands|that lies|that rests|that has been|located|situated|sitting|standing|lying|resting|placed|positioned|found|kept|sit|sits|stands|lies|rests|currently|which|stored|lie|being",
         ),
         (
             E::Goes,
@@ -213,7 +210,7 @@ const TABLE: &[(Entry, &str)] = {
         ),
         (
             E::Unsupported,
-            "grandma|grandpa|mom|mum|dad|someone|somebody|everyone|anyone|human|person|people|user|yourselves|the rest|the others|the remaining|its|own|non|yourself|myself|itself|hand|hands|arm|arms|finger|fingers|or|if|unless|until|while|before|after|when|once|don't|do not|do|never|everything|anything|nothing|something|all|every|each|any|two|three|four|five|six|seven|eight|nine|ten|several|many|except|without|instead|same|where|what|who|whose|why|how|other|another|else|neither|nor|either|ignore|disregard|forget|me|us|him|her|you|i|away|there|here|one|ones|first|second|third|fourth|last|again|avoid|rid|but|because|so|not the|rather|twice|as|for|about|against|through|along|around|across|above|than|is|are|was|be|been|will|would|can't|cannot|won't|shouldn't|no|only|whichever|wherever|putting|placing|picking|moving|taking|holding",
+            "your|more|most|less|fewer|enough|extra|half|few|couple|pair|dozen|lot|lots|bit|grandma|grandpa|mom|mum|dad|someone|somebody|everyone|anyone|human|person|people|user|yourselves|the rest|the others|the remaining|its|own|non|yourself|myself|itself|hand|hands|arm|arms|finger|fingers|or|if|unless|until|while|before|after|when|once|don't|do not|do|never|everything|anything|nothing|something|all|every|each|any|two|three|four|five|six|seven|eight|nine|ten|several|many|except|without|instead|same|where|what|who|whose|why|how|other|another|else|neither|nor|either|ignore|disregard|forget|me|us|him|her|you|i|away|there|here|one|ones|first|second|third|fourth|last|again|avoid|rid|but|because|so|not the|rather|twice|as|for|about|against|through|along|around|across|above|than|is|are|was|be|been|will|would|can't|cannot|won't|shouldn't|no|only|whichever|wherever|putting|placing|picking|moving|taking|holding",
         ),
         (
             E::Skip,
@@ -411,6 +408,12 @@ pub(super) fn is_switchable(name: &str) -> bool {
             "light",
         ],
     )
+}
+
+/// True if the vocabulary has the head of the name.
+pub(super) fn has_known_head(name: &str) -> bool {
+    let object = name.split(" of ").next().unwrap_or(name);
+    is_noun(object.rsplit(' ').next().unwrap_or(object))
 }
 
 fn has_head(name: &str, heads: &[&str]) -> bool {

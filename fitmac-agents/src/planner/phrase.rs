@@ -234,9 +234,8 @@ impl<'i, 'a> Reader<'i, 'a> {
             return Err(Doubt::Incomplete);
         }
         if !lexicon::is_noun(head) {
-            let before = words.len().checked_sub(2).and_then(|at| words.get(at));
             self.doubts.push(
-                if before.is_some_and(|word| lexicon::is_vocabulary_noun(word)) {
+                if words.iter().any(|word| lexicon::is_vocabulary_noun(word)) {
                     Doubt::TrailingWord(head.to_owned())
                 } else {
                     Doubt::UnknownNoun(head.to_owned())
