@@ -42,7 +42,7 @@ pub(super) fn roles<'a>(
         return Ok(roles);
     }
     match verb {
-        Verb::Pick | Verb::Find => {
+        Verb::Pick | Verb::Get | Verb::Find => {
             let goes = after
                 .last()
                 .is_some_and(|place| place.direction == Direction::To);
@@ -187,7 +187,8 @@ pub(super) fn settled_relation(
         (None, name) => {
             let container = name.is_some_and(|name| lexicon::is_container(name));
             let open_box = name.is_some_and(|name| lexicon::is_open_box(name));
-            if open_box || place.preposition == TOWARDS {
+            let surface = name.is_some_and(|name| lexicon::is_surface(name));
+            if open_box || place.preposition == TOWARDS || !(container || surface) {
                 doubts.push(Doubt::RelationGuess);
             }
             let flat = name.is_some_and(|name| name == "tray");

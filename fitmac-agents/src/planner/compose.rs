@@ -15,6 +15,8 @@ use super::types::{
 struct Held {
     target: String,
     source: Option<SpatialPhrase>,
+    /// "Get the milk in the basket" may already be the whole task.
+    loose: bool,
     /// Named by a verb, so that it is a step of its own if nothing follows.
     picked: bool,
 }
@@ -51,6 +53,10 @@ impl<'a> Composer<'a> {
             } => {
                 let fronted = fronted.or_else(|| self.fronted.take());
                 let last = groups.len().saturating_sub(1);
+                if groups.iter().rev().skip(1).any(ends_beside) {
+                    // "Next to the plate and the cup": is the cup the next object?
+                    self.doubts.push(Doubt::AmbiguousAttachment);
+                }
                 for (index, group) in groups.into_iter().enumerate() {
                     let fronted = if index == last { fronted.clone() } else { None };
                     self.command(verb, &group, fronted)?;
@@ -110,7 +116,11 @@ impl<'a> Composer<'a> {
         fronted: Option<Place<'a>>,
     ) -> Result<(), Doubt> {
         let pronoun = matches!(group.names.as_slice(), [] | [Noun::It | Noun::Them]);
-        if verb == Verb::Pick && pronoun && group.after.is_empty() && fronted.is_none() {
+        if matches!(verb, Verb::Pick | Verb::Get)
+            && pronoun
+            && group.after.is_empty()
+            && fronted.is_none()
+        {
             // "Find the milk, pick it up, ...".
             return if self.held.is_empty() || group.names.is_empty() {
                 Err(Doubt::Incomplete)
@@ -126,13 +136,13 @@ impl<'a> Composer<'a> {
             self.doubts.push(Doubt::RelationGuess);
         }
         let action = match verb {
-            Verb::Pick | Verb::Find if roles.destination.is_none() => {
-                return self.hold(group, &roles, verb == Verb::Pick);
+            Verb::Pick | Verb::Get | Verb::Find if roles.destination.is_none() => {
+                return self.hold(group, &roles, verb);
             }
             Verb::Leave if !pronoun || self.held.is_empty() => {
                 return Err(Doubt::Unsupported("leave".to_owned()));
             }
-            Verb::Pick | Verb::Find | Verb::Place | Verb::Leave | Verb::Move => {
+            Verb::Pick | Verb::Get | Verb::Find | Verb::Place | Verb::Leave | Verb::Move => {
                 Action::PickAndPlace
             }
             Verb::Slide if goes_in(&roles) => Action::PickAndPlace,
@@ -167,7 +177,7 @@ impl<'a> Composer<'a> {
             && group.after.is_empty()
             && group.before.is_empty()
         {
-            return self.hold(group, &Roles::default(), false);
+            return self.hold(group, &Roles::default(), Verb::Find);
         }
         if !wanted {
             self.doubts.push(Doubt::NoVerb);
@@ -183,16 +193,18 @@ impl<'a> Composer<'a> {
     }
 
     /// Remembers objects until a clause says what to do with them.
-    fn hold(&mut self, group: &Group<'a>, roles: &Roles<'a>, picked: bool) -> Result<(), Doubt> {
+    fn hold(&mut self, group: &Group<'a>, roles: &Roles<'a>, verb: Verb) -> Result<(), Doubt> {
         self.flush_held()?;
         let source = self.source(roles)?;
         self.check_shared(group, source.as_ref());
+        let place = roles.source.as_ref();
         for target in self.targets(group)? {
             self.mentions.push(target.clone());
             self.held.push(Held {
                 target,
                 source: source.clone(),
-                picked,
+                loose: verb == Verb::Get && place.is_some_and(|place| place.says_plainly()),
+                picked: verb != Verb::Find,
             });
         }
         Ok(())
@@ -202,6 +214,9 @@ impl<'a> Composer<'a> {
         for held in std::mem::take(&mut self.held) {
             if !held.picked {
                 return Err(Doubt::Incomplete);
+            }
+            if held.loose {
+                self.doubts.push(Doubt::AmbiguousAttachment);
             }
             // Another step while this one is in the hand, or two picks.
             if std::mem::replace(&mut self.hand_full, true) || !self.ended {
@@ -227,6 +242,7 @@ impl<'a> Composer<'a> {
             held.push(Held {
                 target,
                 source: None,
+                loose: false,
                 picked: true,
             });
         }
@@ -291,6 +307,13 @@ impl<'a> Composer<'a> {
             _ => self.targets(group)?,
         };
         for target in targets {
+            let fits = match action {
+                Action::Open | Action::Close => lexicon::is_closable(&target),
+                _ => lexicon::is_switchable(&target),
+            };
+            if lexicon::has_known_head(&target) && !fits {
+                return Err(Doubt::Unsupported(target));
+            }
             self.push(action, target, source.clone(), None, "")?;
         }
         Ok(())
@@ -341,6 +364,9 @@ impl<'a> Composer<'a> {
         let mut references = Vec::with_capacity(place.references.len());
         for noun in &place.references {
             references.push(match noun {
+                Noun::Name(name) if plural_stem(name).is_some() => {
+                    return Err(Doubt::Unsupported(name.text.clone()));
+                }
                 Noun::Name(name) => name.text.clone(),
                 Noun::It => self.antecedent(place)?,
                 Noun::Them => return Err(Doubt::Incomplete),
@@ -396,6 +422,13 @@ impl<'a> Composer<'a> {
         }
         self.mentions.push(target.clone());
         if let Some(destination) = &destination {
+            use Relation::{AtBack, AtFront, AtLeft, AtRight};
+            let aside = [AtLeft, AtRight, AtFront, AtBack].contains(&destination.relation);
+            let told_apart = source.is_some() || destination.qualifier.is_some();
+            if aside || (!told_apart && destination.references.contains(&target)) {
+                // Left of where it is, or of the table; the milk on which milk?
+                self.doubts.push(Doubt::RelationGuess);
+            }
             self.mentions.extend(destination.references.iter().cloned());
         }
         let mut subtask = Subtask {
@@ -418,6 +451,11 @@ fn names_something_known(step: &Subtask) -> bool {
     references
         .chain([&step.target])
         .any(|name| lexicon::has_known_head(name))
+}
+
+fn ends_beside(group: &Group<'_>) -> bool {
+    let last = group.after.last();
+    last.is_some_and(|place| place.relation == Some(Relation::NextTo))
 }
 
 fn goes_in(roles: &Roles<'_>) -> bool {

@@ -20,6 +20,8 @@ pub(super) enum Direction {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Verb {
     Pick,
+    /// "Get the milk in the basket": from there, or to there?
+    Get,
     /// "Find": names the object for a later clause, and is no step by itself.
     Find,
     Place,
@@ -124,6 +126,11 @@ pub(super) fn items<'a>(text: &'a str, doubts: &mut Vec<Doubt>) -> Vec<Item<'a>>
         let (item, used) = next_item(rest, after_determiner, at_start);
         items.push(item);
         at += used;
+    }
+    let asks = text.contains('?') && !items.contains(&Item::Filler);
+    if asks {
+        // A question, unless it is a polite request.
+        doubts.push(Doubt::Unsupported("?".to_owned()));
     }
     items
 }

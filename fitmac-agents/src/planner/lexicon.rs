@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use super::lexer::{Direction, Verb};
 use super::types::Relation;
-use super::vocabulary::{COLOURS, COMPOUNDS, CONTAINERS, MODIFIERS, NOUNS, REGIONS};
+use super::vocabulary::{COLOURS, COMPOUNDS, CONTAINERS, MODIFIERS, NOUNS, REGIONS, SURFACES};
 
 /// Meaning of a phrase.
 #[derive(Clone, Copy, Debug)]
@@ -43,8 +43,9 @@ const TABLE: &[(Entry, &str)] = {
     &[
         (
             E::Verb(Verb::Pick),
-            "pick up|pick|pick out|grab|grasp|grip|take|take hold of|get hold of|get|fetch|retrieve|collect|lift|lift up|raise|hold|seize|remove",
+            "pick up|pick|pick out|grab|grasp|grip|take|take hold of|get hold of|fetch|retrieve|collect|lift|lift up|raise|hold|seize|remove",
         ),
+        (E::Verb(Verb::Get), "get"),
         (E::Verb(Verb::Find), "find|locate|select|choose|identify"),
         (
             E::Verb(Verb::Place),
@@ -189,7 +190,7 @@ const TABLE: &[(Entry, &str)] = {
         ),
         (
             E::Goes,
-            "goes|go|should go|must go|needs to go|has to go|ought to go|is to go|belongs|should be|should be put|should be placed|should be moved|should be set|must be put|must be placed|must be moved|needs to be put|needs to be placed|needs to be moved|has to be put|has to be placed|has to be moved|to be put|to be placed|to be moved|is to be put|is to be placed|is to be moved|is put|is placed|ends up|should end up",
+            "goes|go|should go|must go|needs to go|has to go|ought to go|is to go|belongs|should be put|should be placed|should be moved|should be set|must be put|must be placed|must be moved|needs to be put|needs to be placed|needs to be moved|has to be put|has to be placed|has to be moved|to be put|to be placed|to be moved|is to be put|is to be placed|is to be moved|should end up",
         ),
         (
             E::Want,
@@ -210,7 +211,7 @@ const TABLE: &[(Entry, &str)] = {
         ),
         (
             E::Unsupported,
-            "your|more|most|less|fewer|enough|extra|half|few|couple|pair|dozen|lot|lots|bit|grandma|grandpa|mom|mum|dad|someone|somebody|everyone|anyone|human|person|people|user|yourselves|the rest|the others|the remaining|its|own|non|yourself|myself|itself|hand|hands|arm|arms|finger|fingers|or|if|unless|until|while|before|after|when|once|don't|do not|do|never|everything|anything|nothing|something|all|every|each|any|two|three|four|five|six|seven|eight|nine|ten|several|many|except|without|instead|same|where|what|who|whose|why|how|other|another|else|neither|nor|either|ignore|disregard|forget|me|us|him|her|you|i|away|there|here|one|ones|first|second|third|fourth|last|again|avoid|rid|but|because|so|not the|rather|twice|as|for|about|against|through|along|around|across|above|than|is|are|was|be|been|will|would|can't|cannot|won't|shouldn't|no|only|whichever|wherever|putting|placing|picking|moving|taking|holding",
+            "eleven|twelve|hundred|thrice|your|more|most|less|fewer|enough|extra|half|few|couple|pair|dozen|lot|lots|bit|grandma|grandpa|mom|mum|dad|someone|somebody|everyone|anyone|human|person|people|user|yourselves|the rest|the others|the remaining|its|own|non|yourself|myself|itself|hand|hands|arm|arms|finger|fingers|or|if|unless|until|while|before|after|when|once|don't|do not|do|never|everything|anything|nothing|something|all|every|each|any|two|three|four|five|six|seven|eight|nine|ten|several|many|except|without|instead|same|where|what|who|whose|why|how|other|another|else|neither|nor|either|ignore|disregard|forget|me|us|him|her|you|i|away|there|here|one|ones|first|second|third|fourth|last|again|avoid|rid|but|because|so|not the|rather|twice|as|for|about|against|through|along|around|across|above|than|is|are|was|be|been|will|would|can't|cannot|won't|shouldn't|no|only|whichever|wherever|putting|placing|picking|moving|taking|holding",
         ),
         (
             E::Skip,
@@ -388,9 +389,29 @@ pub(super) fn is_closable(name: &str) -> bool {
             "box",
             "oven",
             "fridge",
+            "refrigerator",
             "lid",
+            "jar",
+            "bottle",
+            "bag",
+            "book",
+            "container",
+            "cupboard",
+            "wardrobe",
+            "dresser",
+            "cap",
+            "cover",
+            "carton",
+            "laptop",
+            "bin",
+            "umbrella",
         ],
     )
+}
+
+/// True if "to" an object with this name is onto it.
+pub(super) fn is_surface(name: &str) -> bool {
+    has_head(name, SURFACES)
 }
 
 /// True if an object with this name can be turned on and off.
@@ -406,6 +427,13 @@ pub(super) fn is_switchable(name: &str) -> bool {
             "kettle",
             "toaster",
             "light",
+            "cooker",
+            "phone",
+            "laptop",
+            "screen",
+            "speaker",
+            "camera",
+            "remote",
         ],
     )
 }

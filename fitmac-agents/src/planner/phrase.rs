@@ -34,6 +34,13 @@ pub(super) struct Place<'a> {
     pub(super) references: Vec<Noun>,
 }
 
+impl Place<'_> {
+    /// A place in a plain phrase, that may say where something is or goes.
+    pub(super) fn says_plainly(&self) -> bool {
+        self.direction == Direction::Static && !self.marked
+    }
+}
+
 /// A part of a clause.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Element<'a> {
@@ -128,12 +135,18 @@ impl<'i, 'a> Reader<'i, 'a> {
             self.advance();
         }
         let mut names = vec![self.noun()?];
+        let mut joined = false;
         while let Some(skip) = self.list_connector() {
+            joined |= (0..skip).any(|at| self.peek_after(at) != Some(&Item::Comma));
             self.at += skip;
             if self.peek() == Some(&Item::Both) {
                 self.advance();
             }
             names.push(self.noun()?);
+        }
+        if !joined && names.len() > 1 {
+            // "The milk, the white carton": the same thing twice?
+            self.doubts.push(Doubt::AmbiguousList);
         }
         if !both {
             self.check_list(&names);

@@ -90,7 +90,7 @@ impl Kind {
 
     fn of_verb(verb: Verb) -> Self {
         match verb {
-            Verb::Pick => Self::Pick,
+            Verb::Pick | Verb::Get => Self::Pick,
             Verb::Find => Self::Find,
             Verb::Place => Self::Place,
             Verb::Move => Self::Move,

@@ -9,6 +9,38 @@ pub(super) const MODIFIERS: &str = "black white red green blue yellow orange pur
 /// References into which things go; "to the basket" means in it.
 pub(super) const CONTAINERS: &str = "basket bowl drawer compartment bin microwave crate container oven fridge refrigerator sink bag caddy jar mug cup pot pan bucket trash garbage cupboard hamper carton";
 
+/// References onto which things go; "to the plate" means on it.
+pub(super) const SURFACES: &[&str] = &[
+    "plate",
+    "stove",
+    "table",
+    "cabinet",
+    "shelf",
+    "tray",
+    "counter",
+    "desk",
+    "rack",
+    "burner",
+    "board",
+    "mat",
+    "pad",
+    "coaster",
+    "napkin",
+    "saucer",
+    "floor",
+    "chair",
+    "stand",
+    "top",
+    "dresser",
+    "workbench",
+    "bench",
+    "holder",
+    "dish",
+    "towel",
+    "hook",
+    "scale",
+];
+
 /// Regions of an object: no objects of their own.
 pub(super) const REGIONS: &str = "handle knob top bottom side edge corner front back rear left right middle center centre area region zone section spot rim surface inside outside end half";
 
