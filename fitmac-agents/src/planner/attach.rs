@@ -37,6 +37,10 @@ pub(super) fn roles<'a>(
         if pronoun && group.names.is_empty() {
             return place_pronoun(std::iter::once(destination).chain(after).collect());
         }
+        if after.iter().any(Place::says_plainly) {
+            // "Next to the stove, put the bowl on the plate."
+            doubts.push(Doubt::AmbiguousAttachment);
+        }
         let mut roles = sources(after, doubts)?;
         roles.destination = Some(destination);
         return Ok(roles);

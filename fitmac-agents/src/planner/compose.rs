@@ -6,13 +6,14 @@ use super::clause::{Clause, Group};
 use super::confidence::Doubt;
 use super::lexer::Verb;
 use super::lexicon;
-use super::phrase::{Name, Noun, Place};
+use super::locate::plural_stem;
+use super::phrase::{Noun, Place};
 use super::types::{
     Action, Relation, SUBTASK_CAPACITY, SpatialPhrase, Subtask, canonical_sentence,
 };
 
 /// An object that was named and waits for its destination.
-struct Held {
+pub(super) struct Held {
     target: String,
     source: Option<SpatialPhrase>,
     /// "Get the milk in the basket" may already be the whole task.
@@ -24,15 +25,15 @@ struct Held {
 /// Builds the subtasks of an instruction clause by clause.
 #[derive(Default)]
 pub(super) struct Composer<'a> {
-    subtasks: Vec<Subtask>,
-    held: Vec<Held>,
+    pub(super) subtasks: Vec<Subtask>,
+    pub(super) held: Vec<Held>,
     fronted: Option<Place<'a>>,
     /// A picked object was never put down.
     hand_full: bool,
     /// No clause follows.
     ended: bool,
     /// Names in the order in which they were mentioned.
-    mentions: Vec<String>,
+    pub(super) mentions: Vec<String>,
     pub(super) doubts: Vec<Doubt>,
 }
 
@@ -184,6 +185,9 @@ impl<'a> Composer<'a> {
         }
         for mut group in groups {
             if let Some(place) = group.after.last_mut().filter(|_| wanted) {
+                if place.says_plainly() {
+                    self.doubts.push(Doubt::LooseVerb);
+                }
                 place.marked = place.negated;
             }
             let roles = attach::roles(Verb::Place, &group, None, &mut self.doubts)?;
@@ -197,13 +201,12 @@ impl<'a> Composer<'a> {
         self.flush_held()?;
         let source = self.source(roles)?;
         self.check_shared(group, source.as_ref());
-        let place = roles.source.as_ref();
         for target in self.targets(group)? {
             self.mentions.push(target.clone());
             self.held.push(Held {
                 target,
                 source: source.clone(),
-                loose: verb == Verb::Get && place.is_some_and(|place| place.says_plainly()),
+                loose: verb == Verb::Get,
                 picked: verb != Verb::Find,
             });
         }
@@ -216,7 +219,7 @@ impl<'a> Composer<'a> {
                 return Err(Doubt::Incomplete);
             }
             if held.loose {
-                self.doubts.push(Doubt::AmbiguousAttachment);
+                self.doubts.push(Doubt::LooseVerb);
             }
             // Another step while this one is in the hand, or two picks.
             if std::mem::replace(&mut self.hand_full, true) || !self.ended {
@@ -342,73 +345,6 @@ impl<'a> Composer<'a> {
         }
     }
 
-    fn source(&mut self, roles: &Roles<'a>) -> Result<Option<SpatialPhrase>, Doubt> {
-        self.phrase(roles.source.as_ref(), roles.source_qualifier.as_ref())
-    }
-
-    fn destination(&mut self, roles: &Roles<'a>) -> Result<(SpatialPhrase, &'a str), Doubt> {
-        let place = roles.destination.as_ref().ok_or(Doubt::Incomplete)?;
-        if place.negated {
-            return Err(Doubt::Unsupported("not".to_owned()));
-        }
-        let phrase = self.phrase(Some(place), roles.destination_qualifier.as_ref())?;
-        Ok((phrase.ok_or(Doubt::Incomplete)?, place.preposition))
-    }
-
-    fn phrase(
-        &mut self,
-        place: Option<&Place<'a>>,
-        qualifier: Option<&Place<'a>>,
-    ) -> Result<Option<SpatialPhrase>, Doubt> {
-        let Some(place) = place else { return Ok(None) };
-        let mut references = Vec::with_capacity(place.references.len());
-        for noun in &place.references {
-            references.push(match noun {
-                Noun::Name(name) if plural_stem(name).is_some() => {
-                    return Err(Doubt::Unsupported(name.text.clone()));
-                }
-                Noun::Name(name) => name.text.clone(),
-                Noun::It => self.antecedent(place)?,
-                Noun::Them => return Err(Doubt::Incomplete),
-            });
-        }
-        // "Put the bowl inside": in what was mentioned last.
-        if references.is_empty() && place.relation == Some(Relation::In) {
-            references.push(self.mentions.last().ok_or(Doubt::Incomplete)?.clone());
-        }
-        let relation = attach::settled_relation(place, &references, &mut self.doubts)?;
-        let centre_of_all = relation == Relation::AtCentre && references.is_empty();
-        if centre_of_all {
-            references.push("table".to_owned());
-        }
-        if references.len() != relation.arity() {
-            return Err(Doubt::Incomplete);
-        }
-        let qualifier = self.phrase(qualifier, None)?.map(Box::new);
-        Ok(Some(SpatialPhrase {
-            relation,
-            negated: place.negated,
-            references,
-            qualifier,
-        }))
-    }
-
-    /// The object that "it" stands for in a place: the fixture that was just
-    /// opened or turned on. Elsewhere "behind it" has two readings.
-    fn antecedent(&self, place: &Place<'a>) -> Result<String, Doubt> {
-        let settled = match self.subtasks.last().map(|last| last.action) {
-            Some(Action::Open | Action::TurnOn | Action::TurnOff) => true,
-            Some(_) => matches!(place.relation, Some(Relation::In)),
-            None => false,
-        };
-        let last = self
-            .mentions
-            .last()
-            .filter(|_| settled && self.held.is_empty());
-        last.cloned()
-            .ok_or_else(|| Doubt::Unsupported("it".to_owned()))
-    }
-
     fn push(
         &mut self,
         action: Action,
@@ -419,6 +355,10 @@ impl<'a> Composer<'a> {
     ) -> Result<(), Doubt> {
         if self.subtasks.len() == SUBTASK_CAPACITY {
             return Err(Doubt::TooManySteps);
+        }
+        let fixture = matches!(action, Action::Pick | Action::PickAndPlace | Action::Push);
+        if fixture && lexicon::is_fixed(&target) {
+            return Err(Doubt::Unsupported(target));
         }
         self.mentions.push(target.clone());
         if let Some(destination) = &destination {
@@ -463,15 +403,4 @@ fn goes_in(roles: &Roles<'_>) -> bool {
         .destination
         .as_ref()
         .is_some_and(|place| place.relation == Some(Relation::In))
-}
-
-/// The singular of a name whose head is a plural of the vocabulary.
-fn plural_stem(name: &Name) -> Option<String> {
-    let object = name.text.split(" of ").next()?;
-    let head = object.split(" with ").next()?.rsplit(' ').next()?;
-    if lexicon::is_vocabulary_noun(head) {
-        return None;
-    }
-    let stem = lexicon::singular(head).filter(|stem| lexicon::is_vocabulary_noun(stem))?;
-    Some(name.text.replacen(head, stem, 1))
 }

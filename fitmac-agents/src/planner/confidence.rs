@@ -45,6 +45,9 @@ pub enum Doubt {
     AmbiguousList,
     /// "From the box" may be off it or out of it.
     RelationGuess,
+    /// A word that leaves open whether more or less is wanted than it says: "get
+    /// the milk in the basket", "I need the bowl on the stove".
+    LooseVerb,
     /// Another step begins while an object is in the hand.
     HandFull,
     /// A pronoun that could only be guessed.
@@ -110,6 +113,7 @@ impl Doubt {
             Self::AmbiguousAttachment => "ambiguous_attachment",
             Self::AmbiguousList => "ambiguous_list",
             Self::RelationGuess => "relation_guess",
+            Self::LooseVerb => "loose_verb",
             Self::HandFull => "hand_full",
             Self::PronounGuess => "pronoun_guess",
             Self::UnfamiliarShape(_)
@@ -142,6 +146,7 @@ impl Doubt {
             | Self::AmbiguousAttachment
             | Self::AmbiguousList
             | Self::RelationGuess
+            | Self::LooseVerb
             | Self::HandFull
             | Self::PronounGuess => learned().min(TWO_READINGS),
             Self::UnfamiliarShape(percent) => f64::from(*percent) / 100.0,

@@ -1,8 +1,9 @@
 //! Words and multi-word phrases of an instruction.
 
 use super::confidence::Doubt;
-use super::lexicon::{self, Entry};
+use super::lexicon;
 use super::spelling;
+use super::table::Entry;
 use super::types::Relation;
 
 /// Way in which a preposition points.
@@ -20,7 +21,7 @@ pub(super) enum Direction {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Verb {
     Pick,
-    /// "Get the milk in the basket": from there, or to there?
+    /// A pick that may say more: "get the milk in the basket", "hold the door".
     Get,
     /// "Find": names the object for a later clause, and is no step by itself.
     Find,

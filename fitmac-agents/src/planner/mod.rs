@@ -28,10 +28,12 @@ mod confidence;
 mod learned;
 mod lexer;
 mod lexicon;
+mod locate;
 mod phrase;
 mod schema;
 mod shape;
 mod spelling;
+mod table;
 mod types;
 mod vocabulary;
 

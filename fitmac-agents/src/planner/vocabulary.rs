@@ -9,6 +9,30 @@ pub(super) const MODIFIERS: &str = "black white red green blue yellow orange pur
 /// References into which things go; "to the basket" means in it.
 pub(super) const CONTAINERS: &str = "basket bowl drawer compartment bin microwave crate container oven fridge refrigerator sink bag caddy jar mug cup pot pan bucket trash garbage cupboard hamper carton";
 
+/// Parts of the house: nobody picks them up.
+pub(super) const FIXED: &[&str] = &[
+    "door",
+    "drawer",
+    "cabinet",
+    "stove",
+    "table",
+    "fridge",
+    "refrigerator",
+    "oven",
+    "sink",
+    "counter",
+    "desk",
+    "floor",
+    "wall",
+    "cupboard",
+    "wardrobe",
+    "dresser",
+    "burner",
+    "compartment",
+    "bath",
+    "tub",
+];
+
 /// References onto which things go; "to the plate" means on it.
 pub(super) const SURFACES: &[&str] = &[
     "plate",
