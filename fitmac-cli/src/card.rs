@@ -13,7 +13,7 @@ use std::{
 
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
-use sim_harness::scene::Scene;
+use sim_harness::{object::Shape, scene::Scene};
 
 use crate::timeline::Names;
 
@@ -49,6 +49,8 @@ pub(crate) struct Look {
     pub(crate) label: String,
     /// Red, green, blue, 0 to 1.
     pub(crate) colour: [f32; 3],
+    /// Form and size, for pictures.
+    pub(crate) shape: Shape,
 }
 
 impl Card {
@@ -59,6 +61,7 @@ impl Card {
             name: object.name.clone(),
             label: object.kind.label.clone(),
             colour: object.kind.colour,
+            shape: object.kind.shape.clone(),
         };
         Self {
             instruction: instruction.to_owned(),

@@ -74,7 +74,7 @@ enum Command {
     Sim(cmd::sim::Args),
     /// Look into a recorded trace.
     Trace(cmd::trace::Args),
-    /// Run a surrogate policy.
+    /// Run a policy: a surrogate, or one behind an openpi server.
     Vla(cmd::vla::Args),
 }
 

@@ -5,6 +5,8 @@
 //! consistent with the newest joint positions: the position and velocity stages of the next step
 //! have already run.
 
+mod show;
+
 use std::sync::Arc;
 
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjtState, MjtWarning};

@@ -6,6 +6,8 @@ pub mod docs;
 pub mod fitmac;
 pub mod invariants;
 pub mod link;
+#[cfg(feature = "programs")]
+pub mod openpi;
 pub mod oracle;
 pub mod swarm;
 pub mod world;

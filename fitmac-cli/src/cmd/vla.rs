@@ -1,7 +1,11 @@
-//! `fitmac vla`: a surrogate policy on shared memory.
+//! `fitmac vla`: a policy on shared memory, a surrogate or one behind a server.
 //!
-//! It answers queries with chunks of actions, after as long as its model would
-//! take. It sees what a camera would show, the robot's own state and a prompt.
+//! A surrogate answers queries with chunks of actions, after as long as its model
+//! would take. It sees what a camera would show, the robot's own state and a
+//! prompt.
+
+mod mirror;
+mod openpi;
 
 use std::{
     collections::BTreeMap,
@@ -38,10 +42,11 @@ const LOOK: Duration = Duration::from_micros(500);
 
 /// Arguments of `vla`.
 #[derive(Clone, Debug, clap::Args)]
-#[command(after_help = "Example:
+#[command(after_help = "Examples:
   fitmac vla --instance cell --card scene.json --seed 3
+  fitmac vla --instance cell --card scene.json --openpi ws://127.0.0.1:8000 --openpi-horizon 10
 
-The policy is a surrogate that replays what it memorised of a suite's training
+Without --openpi the policy is a surrogate that replays what it memorised of a suite's training
 scenes; it looks at the scene, not at the words. `fitmac help sim` shows the
 whole set of processes.")]
 pub(crate) struct Args {
@@ -60,12 +65,17 @@ pub(crate) struct Args {
     /// Draws the policy's noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    openpi: openpi::Args,
 }
 
 /// Answers queries until it is asked to end.
 pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
     let signals = Signals::listen()?;
     leave_control_core();
+    if let Some(remote) = openpi::Remote::of(&args.openpi, &args.suite)? {
+        return remote.run(Card::wait_for(&args.card)?, &args.instance, &signals);
+    }
     let suite = Suite::embedded(&args.suite).map_err(|error| BadInput(error.to_string()))?;
     let registry = Registry::embedded()?;
     let spec = registry
@@ -133,13 +143,16 @@ impl View {
         }
     }
 
+    /// What the policy is told for a query: its prompt, or what the operator said.
+    fn prompt(&self, query: &PolicyQuery) -> &str {
+        let prompt = self.prompts.get(&query.prompt_id);
+        let text = prompt.and_then(|prompt| prompt.text().ok());
+        text.unwrap_or(&self.card.instruction)
+    }
+
     /// What a query is answered from, and when it was seen.
     fn observe(&self, query: &PolicyQuery) -> Option<(Observation, u64)> {
         let state = self.state.as_ref()?;
-        let prompt = self
-            .prompts
-            .get(&query.prompt_id)
-            .and_then(|prompt| prompt.text().ok());
         let count = usize::try_from(state.object_count).unwrap_or(usize::MAX);
         let objects = state.objects.iter().take(count).filter_map(|object| {
             let look = self.card.look(object.id)?;
@@ -155,7 +168,7 @@ impl View {
             })
         });
         let observation = Observation {
-            prompt: prompt.unwrap_or(&self.card.instruction).to_owned(),
+            prompt: self.prompt(query).to_owned(),
             policy_step: query.policy_step,
             robot: robot(state),
             surface_m: self.card.surface_m,
