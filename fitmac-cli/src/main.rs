@@ -56,6 +56,8 @@ enum Command {
     Demo(cmd::demo::Args),
     /// Say what of the real-time set-up is missing and how to get it.
     Doctor(cmd::doctor::Args),
+    /// Play a grid of episodes in simulated time, policy alone and with FIT-MAC.
+    Eval(cmd::eval::Args),
     /// Forward kinematics and Jacobian for lines of joint coordinates.
     Fk(cmd::fk::Args),
     /// Say which object of a scene an instruction means.
@@ -97,6 +99,7 @@ fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Config(args) => cmd::config::run(&args),
         Command::Demo(args) => cmd::demo::run(&args),
         Command::Doctor(args) => cmd::doctor::run(&args),
+        Command::Eval(args) => cmd::eval::run(&args),
         Command::Fk(args) => cmd::fk::run(&args),
         Command::Ground(args) => cmd::ground::run(&args),
         Command::Ik(args) => cmd::ik::run(&args),

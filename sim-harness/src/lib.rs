@@ -10,6 +10,7 @@
 
 pub mod action;
 pub mod agents;
+pub mod alone;
 pub mod backbone;
 pub mod error;
 pub mod evaluation;

@@ -21,7 +21,7 @@ use crate::predicate::{Goal, Judge};
 use crate::sim::{RobotState, Sim};
 
 /// Nanoseconds of a physics step.
-const TICK_NS: u64 = 2_000_000;
+pub(crate) const TICK_NS: u64 = 2_000_000;
 const _: () = assert!(TICK_NS as f64 * 1e-9 == PHYSICS_STEP_S);
 /// How long the agents take for a look, ns.
 const GROUNDING_LATENCY_NS: u64 = 200_000_000;
@@ -86,6 +86,19 @@ pub enum Outcome {
     OutOfSteps,
     /// The controller stopped, or nothing moved for longer than an episode may last.
     OutOfTime,
+}
+
+impl Outcome {
+    /// Whether an episode without success is over.
+    pub(crate) fn at(step: u64, tick: u64, max_steps: u64) -> Option<Self> {
+        // Waiting for the policy takes time but no steps: three times as long as without is enough.
+        let longest = 3 * (max_steps + 40) * u64::from(SUBSTEPS);
+        if step > max_steps {
+            Some(Self::OutOfSteps)
+        } else {
+            (tick > longest).then_some(Self::OutOfTime)
+        }
+    }
 }
 
 /// What one tick did.
@@ -187,6 +200,12 @@ impl Lockstep {
         &mut self.sim
     }
 
+    /// The world, when the episode is over.
+    #[must_use]
+    pub fn into_sim(self) -> Sim {
+        self.sim
+    }
+
     /// The controller.
     #[must_use]
     pub fn controller(&self) -> &Controller {
@@ -231,9 +250,7 @@ impl Lockstep {
     /// [`SimError::Diverged`] if the physics fails.
     pub fn step(&mut self) -> Result<Ticked, SimError> {
         let now_ns = self.now_ns();
-        if self.tick.is_multiple_of(u64::from(SUBSTEPS)) {
-            self.perception.capture(now_ns, &mut self.sim);
-        }
+        self.perception.capture(self.tick, now_ns, &mut self.sim);
         self.perception.update(now_ns, &self.sim);
         self.sightings.clear();
         self.sightings.extend(self.perception.sightings());
@@ -283,16 +300,10 @@ impl Lockstep {
         if !self.tick.is_multiple_of(u64::from(SUBSTEPS)) {
             return;
         }
-        // Waiting for the policy takes time but no steps: three times as long as without is enough.
-        let longest = 3 * (self.max_steps + 40) * u64::from(SUBSTEPS);
         self.outcome = if self.judge.look(&self.sim) {
             Some(Outcome::Success)
-        } else if self.policy_step() > self.max_steps {
-            Some(Outcome::OutOfSteps)
-        } else if self.tick > longest {
-            Some(Outcome::OutOfTime)
         } else {
-            None
+            Outcome::at(self.policy_step(), self.tick, self.max_steps)
         };
     }
 

@@ -12,7 +12,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
+use serde::Deserialize;
 
+use crate::action::PHYSICS_STEP_S;
+use crate::error::SimError;
 use crate::pose::{Pose, distance_m};
 use crate::raster::{Camera, first_hits};
 use crate::scene::PlacedObject;
@@ -27,15 +30,23 @@ pub enum PoseSource {
     Modelled(PerceptionParams),
 }
 
+/// The embedded parameters, with their sources.
+const PERCEPTION: &str = include_str!("../assets/perception.toml");
+
 /// How good a modelled perception is.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PerceptionParams {
+    /// Frames a second.
+    pub rate_hz: f64,
     /// From a frame to the poses that come of it, s.
     pub latency_s: f64,
+    /// Standard deviation of each coordinate's slowly drifting error, m.
+    pub bias_m: f64,
+    /// Time over which that error drifts, s.
+    pub bias_time_s: f64,
     /// Standard deviation of each coordinate in each frame, m.
     pub noise_m: f64,
-    /// Standard deviation of each coordinate through an episode, m.
-    pub bias_m: f64,
     /// Standard deviation of the orientation in each frame, rad.
     pub noise_rad: f64,
     /// Probability that a visible object is missed in a frame.
@@ -48,19 +59,67 @@ pub struct PerceptionParams {
     pub min_visible: f64,
 }
 
-impl Default for PerceptionParams {
-    /// What an RGB-D tracker of a good laboratory does.
-    fn default() -> Self {
-        Self {
-            latency_s: 0.08,
-            noise_m: 0.003,
-            bias_m: 0.002,
-            noise_rad: 0.02,
-            dropout: 0.05,
-            misdetection: 0.002,
-            mislabel: 0.01,
-            min_visible: 0.15,
+impl PerceptionParams {
+    /// The embedded parameters: an RGB-D tracker of a good laboratory.
+    ///
+    /// # Errors
+    /// Only if the embedded file is broken, which a test rules out.
+    pub fn embedded() -> Result<Self, SimError> {
+        Self::parse("perception.toml", PERCEPTION)
+    }
+
+    /// Reads parameters. `file` is the name that errors give.
+    ///
+    /// # Errors
+    /// [`SimError::Data`] for text of the wrong form, [`SimError::Invalid`] for a wrong value.
+    pub fn parse(file: &str, text: &str) -> Result<Self, SimError> {
+        let read: Self = toml::from_str(text).map_err(|e| SimError::Data {
+            file: file.to_owned(),
+            message: e.to_string(),
+        })?;
+        read.problem()
+            .map_or(Ok(read), |problem| Err(SimError::invalid(file, problem)))
+    }
+
+    /// Names the first value that is out of range.
+    fn problem(&self) -> Option<String> {
+        let shares = [
+            ("dropout", self.dropout),
+            ("misdetection", self.misdetection),
+            ("mislabel", self.mislabel),
+            ("min_visible", self.min_visible),
+        ];
+        if let Some((name, value)) = shares.iter().find(|(_, p)| !(0.0..=1.0).contains(p)) {
+            return Some(format!("{name} is {value}; a share lies in 0 to 1"));
         }
+        let sizes = [
+            ("latency_s", self.latency_s),
+            ("bias_m", self.bias_m),
+            ("noise_m", self.noise_m),
+            ("noise_rad", self.noise_rad),
+        ];
+        if let Some((name, value)) = sizes.iter().find(|(_, v)| !(v.is_finite() && *v >= 0.0)) {
+            return Some(format!("{name} is {value}; it must not be negative"));
+        }
+        if !(self.bias_time_s.is_finite() && self.bias_time_s > 0.0) {
+            return Some(format!(
+                "bias_time_s is {}; it must be positive",
+                self.bias_time_s
+            ));
+        }
+        let steps = 1.0 / (self.rate_hz * PHYSICS_STEP_S);
+        let whole = steps.is_finite() && steps >= 1.0 && (steps - steps.round()).abs() < 1e-6;
+        (!whole).then(|| format!("rate_hz is {}; it must divide 500", self.rate_hz))
+    }
+
+    /// Physics steps between frames.
+    fn frame_steps(&self) -> u64 {
+        (1.0 / (self.rate_hz * PHYSICS_STEP_S)).round() as u64
+    }
+
+    /// How much of the drifting error is left a frame later.
+    fn bias_kept(&self) -> f64 {
+        libm::exp(-1.0 / (self.rate_hz * self.bias_time_s))
     }
 }
 
@@ -158,13 +217,16 @@ impl Perception {
         }
     }
 
-    /// Takes a frame now; call it at the camera's rate.
-    pub fn capture(&mut self, now_ns: u64, sim: &mut Sim) {
-        let frame = match self.source.clone() {
-            PoseSource::Truth => return,
-            PoseSource::Modelled(params) => self.measure(now_ns, sim, &params),
+    /// Takes a frame if one is due at this physics step.
+    pub fn capture(&mut self, step: u64, now_ns: u64, sim: &mut Sim) {
+        let PoseSource::Modelled(params) = &self.source else {
+            return;
         };
-        self.frames.push_back(frame);
+        if step.is_multiple_of(params.frame_steps()) {
+            let params = params.clone();
+            let frame = self.measure(now_ns, sim, &params);
+            self.frames.push_back(frame);
+        }
     }
 
     /// Brings what is known up to date, to be read by [`Perception::sightings`].
@@ -195,11 +257,14 @@ impl Perception {
 
     fn measure(&mut self, now_ns: u64, sim: &mut Sim, params: &PerceptionParams) -> Frame {
         let shares = visible_shares(sim);
+        let kept = params.bias_kept();
         let objects = sim.objects();
         let rng = &mut self.rng;
         let mut seen: Vec<Option<Measured>> = Vec::with_capacity(objects.len());
         for (i, object) in objects.iter().enumerate() {
             // Every draw is made for every object, so that one object's luck is not another's.
+            let drift = params.bias_m * libm::sqrt(1.0 - kept * kept) * unit_noise(rng);
+            self.bias_m[i] = kept * self.bias_m[i] + drift;
             let noise = params.noise_m * unit_noise(rng) + self.bias_m[i];
             let turn = params.noise_rad * unit_noise(rng);
             let missed = rng.random_bool(params.dropout);

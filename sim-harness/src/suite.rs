@@ -187,10 +187,18 @@ impl Suite {
     /// # Errors
     /// [`SimError::Unknown`], listing the names that exist.
     pub fn task(&self, name: &str) -> Result<&Task, SimError> {
+        Ok(&self.tasks[self.task_index(name)?])
+    }
+
+    /// The number of a task, from 0.
+    ///
+    /// # Errors
+    /// [`SimError::Unknown`], listing the names that exist.
+    pub fn task_index(&self, name: &str) -> Result<usize, SimError> {
         let names = self.tasks.iter().map(|t| &*t.name);
         self.tasks
             .iter()
-            .find(|t| t.name == name)
+            .position(|t| t.name == name)
             .ok_or_else(|| SimError::unknown("task", name, names))
     }
 

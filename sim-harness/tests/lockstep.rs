@@ -26,7 +26,7 @@ fn setup(seed: u64, swapped: bool, switches: Switches, pose_source: PoseSource) 
         sim: Sim::new(scene).unwrap(),
         goal,
         instruction: task.instruction.clone(),
-        backbone: registry.get("openvla-like").unwrap().build(&suite).unwrap(),
+        backbone: registry.build("openvla-like", &suite).unwrap(),
         agents: Box::new(OracleAgents::new(goal)),
         params: Params {
             switches,
@@ -78,7 +78,7 @@ fn run(setup: Setup) -> Run {
 
 #[test]
 fn the_same_seed_gives_the_same_episode() {
-    let modelled = || PoseSource::Modelled(PerceptionParams::default());
+    let modelled = || PoseSource::Modelled(PerceptionParams::embedded().unwrap());
     let first = run(setup(1003, true, Switches::FULL, modelled()));
     let second = run(setup(1003, true, Switches::FULL, modelled()));
     assert_eq!(first.actions, second.actions);

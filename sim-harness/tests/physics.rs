@@ -225,7 +225,7 @@ fn play(suite: &Suite, task: &str, seed: u64, swap: bool) -> (bool, Sim, Goal) {
     let mut sim = Sim::new(scene).unwrap();
     let mut judge = Judge::new(goal);
     let registry = Registry::embedded().unwrap();
-    let mut policy = registry.get("openvla-like").unwrap().build(suite).unwrap();
+    let mut policy = registry.build("openvla-like", suite).unwrap();
     policy.reset(seed);
     for _ in 0..10 {
         sim.step_policy(&WAIT).unwrap();
@@ -285,7 +285,7 @@ fn chunks_are_equal_for_equal_seeds_and_blind_to_the_text() {
     let sim = Sim::new(object_scene("butter", 3)).unwrap();
     let chunk = |seed: u64, prompt: &str| {
         let registry = Registry::embedded().unwrap();
-        let mut policy = registry.get("openvla-like").unwrap().build(&suite).unwrap();
+        let mut policy = registry.build("openvla-like", &suite).unwrap();
         policy.reset(seed);
         policy.infer(&Observation::of(&sim, prompt, 0))
     };

@@ -5,6 +5,7 @@ pub(crate) mod arm;
 pub(crate) mod config;
 pub(crate) mod demo;
 pub(crate) mod doctor;
+pub(crate) mod eval;
 pub(crate) mod fk;
 pub(crate) mod ground;
 pub(crate) mod ik;

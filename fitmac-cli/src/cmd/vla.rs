@@ -13,9 +13,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use anyhow::Context;
 use fitmac_core::{
-    message::{ActionChunk, CHUNK_CAPACITY, PolicyQuery, StateSample},
+    message::{ActionChunk, PolicyQuery, StateSample},
     wire::{ActionFrame, ActionSpace, GraspClass, GripperConvention},
 };
 use fitmac_rt::{
@@ -59,7 +58,8 @@ pub(crate) struct Args {
     /// The suite that the policy was trained on.
     #[arg(long, default_value = "object")]
     suite: String,
-    /// Which surrogate: openvla-like, pi0-like, pi05-like, and controls.
+    /// Which surrogate: openvla-like, pi0-like, pi05-like, blind-replay, chaos, and controls
+    /// (oracle, hold, random).
     #[arg(long, default_value = "openvla-like")]
     backbone: String,
     /// Draws the policy's noise.
@@ -78,10 +78,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
     }
     let suite = Suite::embedded(&args.suite).map_err(|error| BadInput(error.to_string()))?;
     let registry = Registry::embedded()?;
-    let spec = registry
-        .get(&args.backbone)
+    let mut backbone = registry
+        .build(&args.backbone, &suite)
         .map_err(|error| BadInput(error.to_string()))?;
-    let mut backbone = spec.build(&suite)?;
     backbone.reset(args.seed);
     let card = Card::wait_for(&args.card)?;
     let instance = Instance::named(&args.instance)?;
@@ -109,8 +108,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
         // A model takes its time; ours has to be made to.
         let latency = Duration::from_secs_f64(answer.latency_s.clamp(0.0, 60.0));
         wait(latency.saturating_sub(started.elapsed()), &signals);
-        let mut chunk = wrap(&answer, observed_ns)?;
-        endpoint.send_chunk(clock::now_ns(), &query, &mut chunk)?;
+        for _ in 0..answer.copies {
+            let mut chunk = wrap(&answer, observed_ns);
+            endpoint.send_chunk(clock::now_ns(), &query, &mut chunk)?;
+        }
     }
     Ok(Exit::Done)
 }
@@ -204,8 +205,8 @@ fn object_class(code: u8) -> Option<ObjectClass> {
     })
 }
 
-/// The answer as a message.
-fn wrap(answer: &Chunk, observed_ns: u64) -> anyhow::Result<ActionChunk> {
+/// The answer as a message. One that is too long keeps its horizon, and is refused for it.
+fn wrap(answer: &Chunk, observed_ns: u64) -> ActionChunk {
     let mut chunk = ActionChunk {
         observation_ns: observed_ns,
         horizon: u32::try_from(answer.actions.len()).unwrap_or(u32::MAX),
@@ -214,12 +215,8 @@ fn wrap(answer: &Chunk, observed_ns: u64) -> anyhow::Result<ActionChunk> {
         gripper: GripperConvention::MinusOneOpen.code(),
         ..ActionChunk::default()
     };
-    let room = chunk
-        .actions
-        .get_mut(..answer.actions.len())
-        .with_context(|| format!("the policy answered with more than {CHUNK_CAPACITY} actions"))?;
-    for (slot, action) in room.iter_mut().zip(&answer.actions) {
+    for (slot, action) in chunk.actions.iter_mut().zip(&answer.actions) {
         *slot = action.map(|component| component as f32);
     }
-    Ok(chunk)
+    chunk
 }

@@ -67,10 +67,9 @@ pub struct Chaos {
 }
 
 impl Chaos {
-    /// Spoils a share `rate` of the answers of `inner`.
+    /// Spoils a share `rate` of the answers of `inner`; `name` is what tables call it.
     #[must_use]
-    pub fn new(inner: Box<dyn Backbone>, rate: f64) -> Self {
-        let name = format!("chaos({})", inner.name());
+    pub fn new(name: &str, inner: Box<dyn Backbone>, rate: f64) -> Self {
         let rng = ChaCha8Rng::seed_from_u64(0);
         Self {
             inner,
@@ -78,7 +77,7 @@ impl Chaos {
             rng,
             enabled: Fault::ALL.to_vec(),
             last: None,
-            name,
+            name: name.to_owned(),
         }
     }
 
@@ -168,7 +167,7 @@ mod tests {
     fn every_fault_spoils_an_answer_in_its_way() {
         let sim = Sim::new(Scene::new(Arena::default())).unwrap();
         let seen = Observation::of(&sim, "", 0);
-        let mut chaos = Chaos::new(Box::new(Hold::new(8)), 1.0);
+        let mut chaos = Chaos::new("chaos", Box::new(Hold::new(8)), 1.0);
         chaos.reset(3);
         assert!(!chaos.enabled().is_empty() && chaos.enabled().len() < Fault::ALL.len());
         let good = chaos.inner.infer(&seen);

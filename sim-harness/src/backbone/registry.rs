@@ -3,6 +3,7 @@
 use serde::Deserialize;
 use sha2::{Digest as _, Sha256};
 
+use super::chaos::Chaos;
 use super::control::{Hold, Random};
 use super::replay::ReplayParams;
 use super::{Backbone, Memory, Replay};
@@ -27,6 +28,16 @@ pub enum Spec {
         /// Actions that are executed before the next query.
         open_loop: u32,
     },
+    /// Another one of the data, whose answers are spoilt on the way. For safety, never for success
+    /// rates.
+    Chaos {
+        /// Name in tables.
+        name: String,
+        /// Whose answers are spoilt.
+        of: String,
+        /// Share of the answers that are.
+        rate: f64,
+    },
     /// Moves at random.
     Random {
         /// Name in tables.
@@ -44,29 +55,28 @@ impl Spec {
     pub fn name(&self) -> &str {
         match self {
             Self::Replay(params) => &params.name,
-            Self::Hold { name, .. } | Self::Random { name, .. } => name,
+            Self::Hold { name, .. } | Self::Random { name, .. } | Self::Chaos { name, .. } => name,
         }
     }
 
-    /// Actions that are executed before the next query.
-    #[must_use]
-    pub fn open_loop(&self) -> u32 {
+    /// What is wrong with it, if something is; `earlier` are the surrogates before it.
+    fn problem(&self, earlier: &[Self]) -> Option<String> {
         match self {
-            Self::Replay(params) => params.open_loop,
-            Self::Hold { open_loop, .. } | Self::Random { open_loop, .. } => *open_loop,
+            Self::Replay(params) => params.problem(),
+            Self::Hold { horizon: 0, .. } | Self::Random { horizon: 0, .. } => {
+                Some("horizon is 0; it must be positive".to_owned())
+            }
+            Self::Hold { .. } | Self::Random { .. } => None,
+            Self::Chaos { rate, .. } if !(0.0..=1.0).contains(rate) => {
+                Some(format!("rate is {rate}; a share lies in 0 to 1"))
+            }
+            Self::Chaos { of, .. } => {
+                let known = |spec: &Self| spec.name() == of && !matches!(spec, Self::Chaos { .. });
+                let problem =
+                    format!("of is `{of}`; it must name an earlier set of another family");
+                (!earlier.iter().any(known)).then_some(problem)
+            }
         }
-    }
-
-    /// A policy that was trained on a suite.
-    ///
-    /// # Errors
-    /// If the suite's names do not resolve.
-    pub fn build(&self, suite: &Suite) -> Result<Box<dyn Backbone>, SimError> {
-        Ok(match self {
-            Self::Replay(params) => Box::new(Replay::new(params.clone(), Memory::of(suite)?)),
-            Self::Hold { horizon, .. } => Box::new(Hold::new(*horizon)),
-            Self::Random { horizon, .. } => Box::new(Random::new(*horizon)),
-        })
     }
 }
 
@@ -100,19 +110,10 @@ impl Registry {
             file: file.to_owned(),
             message: e.to_string(),
         })?;
-        for spec in &read.backbone {
-            let problem = match spec {
-                Spec::Replay(params) => params.problem(),
-                Spec::Hold { horizon: 0, .. } | Spec::Random { horizon: 0, .. } => {
-                    Some("horizon is 0; it must be positive".to_owned())
-                }
-                Spec::Hold { .. } | Spec::Random { .. } => None,
-            };
-            if let Some(problem) = problem {
-                return Err(SimError::invalid(
-                    format!("backbone `{}`", spec.name()),
-                    problem,
-                ));
+        for (i, spec) in read.backbone.iter().enumerate() {
+            if let Some(problem) = spec.problem(&read.backbone[..i]) {
+                let what = format!("backbone `{}`", spec.name());
+                return Err(SimError::invalid(what, problem));
             }
         }
         let digest = Sha256::digest(text.as_bytes());
@@ -134,12 +135,49 @@ impl Registry {
             .ok_or_else(|| SimError::unknown("backbone", name, self.names()))
     }
 
+    /// Actions of a chunk that are executed before the next query.
+    ///
+    /// # Errors
+    /// As for [`Registry::get`].
+    pub fn open_loop(&self, name: &str) -> Result<u32, SimError> {
+        match self.get(name)? {
+            Spec::Replay(params) => Ok(params.open_loop),
+            Spec::Hold { open_loop, .. } | Spec::Random { open_loop, .. } => Ok(*open_loop),
+            Spec::Chaos { of, .. } => self.open_loop(of),
+        }
+    }
+
+    /// A policy that was trained on a suite.
+    ///
+    /// # Errors
+    /// As for [`Registry::get`], and if the suite's names do not resolve.
+    pub fn build(&self, name: &str, suite: &Suite) -> Result<Box<dyn Backbone>, SimError> {
+        Ok(match self.get(name)? {
+            Spec::Replay(params) => Box::new(Replay::new(params.clone(), Memory::of(suite)?)),
+            Spec::Hold { horizon, .. } => Box::new(Hold::new(*horizon)),
+            Spec::Random { horizon, .. } => Box::new(Random::new(*horizon)),
+            Spec::Chaos { of, rate, .. } => {
+                Box::new(Chaos::new(name, self.build(of, suite)?, *rate))
+            }
+        })
+    }
+
     /// The names of all surrogates, in the order of the data.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.specs.iter().map(Spec::name)
     }
 
-    /// SHA-256 of the parameter file, in hexadecimal: it stands in every result.
+    /// The first twelve hexadecimal digits of the SHA-256 of what defines a surrogate: they stand
+    /// in every result.
+    ///
+    /// # Errors
+    /// As for [`Registry::get`].
+    pub fn fingerprint(&self, name: &str) -> Result<String, SimError> {
+        self.get(name)?;
+        Ok(self.sha256.chars().take(12).collect())
+    }
+
+    /// SHA-256 of the parameter file, in hexadecimal.
     #[must_use]
     pub fn sha256(&self) -> &str {
         &self.sha256

@@ -154,12 +154,14 @@ impl Vision {
     }
 
     /// The pose source.
-    #[must_use]
-    pub fn source(self) -> PoseSource {
-        match self {
+    ///
+    /// # Errors
+    /// As for [`PerceptionParams::embedded`].
+    pub fn source(self) -> Result<PoseSource, SimError> {
+        Ok(match self {
             Self::Truth => PoseSource::Truth,
-            Self::Modelled => PoseSource::Modelled(PerceptionParams::default()),
-        }
+            Self::Modelled => PoseSource::Modelled(PerceptionParams::embedded()?),
+        })
     }
 }
 

@@ -1,0 +1,6 @@
+//! Lets the benchmarks find MuJoCo's library where `cargo xtask setup` put it.
+
+fn main() {
+    let root = std::env::var("CARGO_MANIFEST_DIR").expect("cargo sets CARGO_MANIFEST_DIR");
+    println!("cargo:rustc-link-arg-benches=-Wl,-rpath,{root}/../third_party/mujoco/lib");
+}

@@ -1,0 +1,123 @@
+//! Runs a grid on all cores.
+
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
+
+use super::episode::play;
+use super::grid::{EpisodeSpec, Grid, Shard};
+use super::record::EpisodeRecord;
+use super::store::Store;
+use crate::error::SimError;
+
+/// What has happened so far, for a progress display.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress<'a> {
+    /// Episodes of the share.
+    pub total: usize,
+    /// Episodes done, those of earlier runs included.
+    pub done: usize,
+    /// The episode that was just finished; none at the start.
+    pub last: Option<&'a EpisodeRecord>,
+}
+
+/// What a run did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// Episodes of the share.
+    pub total: usize,
+    /// Episodes that were already there.
+    pub found: usize,
+    /// Episodes that were run now.
+    pub run: usize,
+    /// Successes among those.
+    pub successes: usize,
+    /// Simulated time of those, s.
+    pub simulated_s: f64,
+    /// Whether it was asked to stop before the end.
+    pub stopped: bool,
+}
+
+/// Runs what is missing of a shard, on `jobs` threads (0 for all cores), into `folder`.
+///
+/// `stop` is looked at before each episode; what runs is finished and kept.
+///
+/// # Errors
+/// The first error of an episode or of the file; whatever was finished is kept.
+pub fn run(
+    grid: &Grid,
+    shard: Shard,
+    folder: &Path,
+    jobs: usize,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(Progress<'_>) + Sync),
+) -> Result<Summary, SimError> {
+    let all = grid.episodes()?;
+    let share: Vec<EpisodeSpec> = all
+        .into_iter()
+        .enumerate()
+        .filter(|(i, _)| *i % shard.count as usize == shard.index as usize)
+        .map(|(_, spec)| spec)
+        .collect();
+    let store = Store::open(folder, shard)?;
+    let missing: Vec<&EpisodeSpec> = share.iter().filter(|spec| !store.has(spec)).collect();
+    let total = share.len();
+    let found = total - missing.len();
+    progress(Progress {
+        total,
+        done: found,
+        last: None,
+    });
+    let shared = Mutex::new((
+        store,
+        Summary {
+            total,
+            found,
+            ..Summary::default()
+        },
+    ));
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(jobs)
+        .build()
+        .map_err(|e| {
+            SimError::invalid(
+                format!("{jobs} jobs"),
+                format!("the threads can't be started: {e}"),
+            )
+        })?;
+    let ran = pool.install(|| {
+        missing.par_iter().try_for_each(|spec| {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            let record = play(spec)?;
+            // A thread that panicked left nothing half done: a line is written in one go.
+            let mut shared = shared
+                .lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner);
+            let (store, summary) = &mut *shared;
+            store.append(&record)?;
+            summary.run += 1;
+            summary.successes += usize::from(record.success);
+            summary.simulated_s += record.sim_seconds;
+            let done = summary.found + summary.run;
+            progress(Progress {
+                total,
+                done,
+                last: Some(&record),
+            });
+            Ok(())
+        })
+    });
+    let (store, mut summary) = shared
+        .into_inner()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    ran?;
+    summary.stopped = summary.found + summary.run < total;
+    if !summary.stopped {
+        store.sort(&share)?;
+    }
+    Ok(summary)
+}
