@@ -2,16 +2,17 @@
 //! reliability diagram.
 //!
 //! ```text
-//! cargo run --release -p fitmac-agents --example reliability -- report out/kappa.png
-//! cargo run --release -p fitmac-agents --example reliability -- fit
+//! cargo run -p fitmac-agents --example reliability -- report docs/kappa.png
+//! cargo run -p fitmac-agents --example reliability -- fit
 //! ```
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use anyhow::Context as _;
 use fitmac_agents::canvas::{Canvas, Colour};
 use fitmac_agents::grounder::{Verdict, kappa};
-use fitmac_agents::synthetic::{self, DetectorModel, Outcome};
+use fitmac_agents::synthetic::{self, Bin, DetectorModel, Outcome, calibration_error, reliability};
 
 /// Seeds that the report uses; the fit never sees them.
 const REPORT_SEEDS: [u64; 5] = [7, 11, 13, 17, 23];
@@ -21,9 +22,8 @@ fn main() -> anyhow::Result<()> {
     let mut arguments = std::env::args().skip(1);
     match arguments.next().as_deref() {
         Some("fit") => {
-            let mut scenes = outcomes(1000..1020, &DetectorModel::default());
-            scenes.extend(outcomes(1020..1040, &DetectorModel::harsh()));
-            fit(&scenes);
+            fit(&mixed(1000..1020, 1020..1040));
+            knots(&mixed(1040..1055, 1055..1070));
             Ok(())
         }
         Some("report") => report(arguments.next().as_deref()),
@@ -39,9 +39,47 @@ fn outcomes(seeds: impl IntoIterator<Item = u64>, model: &DetectorModel) -> Vec<
         .collect()
 }
 
+/// Scenes of the default detector and of the harsh one.
+fn mixed(default: Range<u64>, harsh: Range<u64>) -> Vec<Outcome> {
+    let mut scenes = outcomes(default, &DetectorModel::default());
+    scenes.extend(outcomes(harsh, &DetectorModel::harsh()));
+    scenes
+}
+
+/// Pool-adjacent-violators on groups of equal size.
+fn knots(outcomes: &[Outcome]) {
+    const GROUP: usize = 400;
+    let told = |o: &Outcome| Some((kappa::raw(&o.evidence?), f64::from(u8::from(o.right))));
+    let mut data: Vec<(f64, f64)> = outcomes.iter().filter_map(told).collect();
+    data.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // Sum of what was told, sum of right, count.
+    let mut groups: Vec<[f64; 3]> = Vec::new();
+    for chunk in data.chunks(GROUP) {
+        let sum = |part: fn(&(f64, f64)) -> f64| chunk.iter().map(part).sum::<f64>();
+        groups.push([sum(|row| row.0), sum(|row| row.1), chunk.len() as f64]);
+        while let [.., low, high] = groups.as_slice()
+            && low[1] / low[2] >= high[1] / high[2]
+        {
+            let pooled = [low[0] + high[0], low[1] + high[1], low[2] + high[2]];
+            groups.truncate(groups.len() - 2);
+            groups.push(pooled);
+        }
+    }
+    println!("{} scenes", data.len());
+    println!("(0.0, 0.0),");
+    for [told, right, count] in groups {
+        // No share is certain: the rule of succession.
+        println!(
+            "({:.3}, {:.3}),",
+            told / count,
+            (right + 1.0) / (count + 2.0)
+        );
+    }
+}
+
 /// Newton's method on the logistic likelihood, with a small ridge.
 fn fit(outcomes: &[Outcome]) {
-    const N: usize = 6;
+    const N: usize = kappa::TERMS;
     let data: Vec<([f64; N], f64)> = outcomes
         .iter()
         .filter_map(|o| Some((kappa::terms(&o.evidence?), f64::from(u8::from(o.right)))))
@@ -73,11 +111,10 @@ fn fit(outcomes: &[Outcome]) {
             *weight += step;
         }
     }
-    println!(
-        "{} scenes; constant, margin, support, detection, margin x support, margin x detection:",
-        data.len()
-    );
-    println!("{weights:.3?}");
+    println!("{} scenes", data.len());
+    for (name, weight) in kappa::TERM_NAMES.iter().zip(weights) {
+        println!("{weight:>8.3}, // {name}");
+    }
 }
 
 /// Gauss with pivoting.
@@ -110,9 +147,12 @@ fn report(png: Option<&str>) -> anyhow::Result<()> {
     println!("== a detector of ordinary noise");
     let bins = table(&outcomes(REPORT_SEEDS, &DetectorModel::default()));
     println!("\n== a detector on a bad day");
-    table(&outcomes(REPORT_SEEDS, &DetectorModel::harsh()));
+    let harsh = table(&outcomes(REPORT_SEEDS, &DetectorModel::harsh()));
     if let Some(path) = png {
-        let image = diagram(&bins).png()?;
+        let mut canvas = Canvas::filled(2 * SIDE_PX, SIDE_PX, Colour::WHITE);
+        diagram(&mut canvas, 0, "ordinary noise", &bins);
+        diagram(&mut canvas, SIDE_PX as i32, "a bad day", &harsh);
+        let image = canvas.png()?;
         std::fs::write(path, image).with_context(|| format!("{path} can't be written"))?;
     }
     Ok(())
@@ -147,9 +187,16 @@ fn table(outcomes: &[Outcome]) -> [Bin; 10] {
             percent(reported, ambiguous)
         );
     }
+    let mut errors: Vec<f64> = outcomes.iter().filter_map(|o| o.error_m).collect();
+    errors.sort_by(f64::total_cmp);
+    let at = |share: f64| 1000.0 * errors[((errors.len() - 1) as f64 * share) as usize];
+    println!(
+        "\nposition of the selected object off by {:.0} mm in the median, {:.0} mm in one of twenty",
+        at(0.5),
+        at(0.95)
+    );
     let bins = reliability(outcomes);
     println!("\nkappa bin, locks, mean kappa, right");
-    let mut error = 0.0;
     for (index, bin) in bins.iter().enumerate().filter(|(_, bin)| bin.locks > 0) {
         let locks = f64::from(bin.locks);
         println!(
@@ -160,10 +207,8 @@ fn table(outcomes: &[Outcome]) -> [Bin; 10] {
             bin.kappa / locks,
             f64::from(bin.right) / locks
         );
-        error += (bin.kappa - f64::from(bin.right)).abs();
     }
-    let locks: u32 = bins.iter().map(|bin| bin.locks).sum();
-    println!("expected calibration error {:.4}", error / f64::from(locks));
+    println!("expected calibration error {:.4}", calibration_error(&bins));
     bins
 }
 
@@ -175,31 +220,15 @@ fn percent(part: u32, whole: u32) -> f64 {
     }
 }
 
-#[derive(Clone, Copy, Default)]
-struct Bin {
-    locks: u32,
-    right: u32,
-    kappa: f64,
-}
-
-fn reliability(outcomes: &[Outcome]) -> [Bin; 10] {
-    let mut bins = [Bin::default(); 10];
-    for outcome in outcomes.iter().filter(|o| o.verdict != Verdict::NotFound) {
-        let bin = &mut bins[((outcome.kappa * 10.0) as usize).min(9)];
-        bin.locks += 1;
-        bin.right += u32::from(outcome.right);
-        bin.kappa += outcome.kappa;
-    }
-    bins
-}
+/// Side of a diagram, px.
+const SIDE_PX: u32 = 480;
 
 /// Share of right locks over kappa, with the diagonal and the counts.
-fn diagram(bins: &[Bin; 10]) -> Canvas {
-    let (size, margin) = (480_u32, 56_i32);
-    let mut canvas = Canvas::filled(size, size, Colour::WHITE);
-    let plot = size as i32 - 2 * margin;
-    let x = |value: f64| margin + (value * f64::from(plot)) as i32;
-    let y = |value: f64| size as i32 - margin - (value * f64::from(plot)) as i32;
+fn diagram(canvas: &mut Canvas, left_px: i32, title: &str, bins: &[Bin; 10]) {
+    let margin = 56_i32;
+    let plot = SIDE_PX as i32 - 2 * margin;
+    let x = |value: f64| left_px + margin + (value * f64::from(plot)) as i32;
+    let y = |value: f64| SIDE_PX as i32 - margin - (value * f64::from(plot)) as i32;
     canvas.line([x(0.0), y(0.0)], [x(1.0), y(1.0)], Colour::GREY);
     for (index, bin) in bins.iter().enumerate().filter(|(_, bin)| bin.locks > 0) {
         let share = f64::from(bin.right) / f64::from(bin.locks);
@@ -235,10 +264,10 @@ fn diagram(bins: &[Bin; 10]) -> Canvas {
         );
     }
     canvas.text("reported kappa", [x(0.5) - 42, y(0.0) + 28], Colour::BLACK);
+    canvas.text(title, [x(0.0), 14], Colour::BLACK);
     canvas.text(
         "share of right locks (red: at the bin's mean kappa)",
-        [x(0.0), 20],
+        [x(0.0), 30],
         Colour::BLACK,
     );
-    canvas
 }

@@ -205,6 +205,16 @@ impl Scene {
         self.camera.as_ref().map_or(Ok(()), check_camera)
     }
 
+    /// Mean of the detector's confidence in the objects, 0 to 1; 0 without any.
+    #[must_use]
+    pub fn mean_confidence(&self) -> f64 {
+        if self.objects.is_empty() {
+            return 0.0;
+        }
+        let sum: f64 = self.objects.iter().map(|object| object.confidence).sum();
+        sum / self.objects.len() as f64
+    }
+
     /// Objects, then fixtures.
     pub fn all(&self) -> impl Iterator<Item = &Detection> {
         self.objects.iter().chain(&self.fixtures)

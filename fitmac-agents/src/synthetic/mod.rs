@@ -8,6 +8,7 @@ mod catalogue;
 mod detector;
 mod layout;
 mod placing;
+mod reliability;
 mod truth;
 
 use rand::{RngExt, SeedableRng};
@@ -20,6 +21,7 @@ use crate::track::{TrackParams, Tracker};
 
 pub use detector::DetectorModel;
 pub use layout::Layout;
+pub use reliability::{Bin, calibration_error, reliability};
 pub use truth::Truth;
 
 /// Scenes that the detector reports before the grounder is asked.
@@ -75,6 +77,8 @@ pub struct Outcome {
     pub clear: bool,
     /// True if the selected object is the one that is meant.
     pub right: bool,
+    /// Distance of the selected object's reported position from its true one, m.
+    pub error_m: Option<f64>,
     /// How the grounding ended.
     pub verdict: Verdict,
     /// Its confidence.
@@ -102,6 +106,8 @@ pub fn run(case: &Case) -> (Grounding, Outcome) {
         .selected()
         .and_then(|candidate| scene.objects.get(candidate.seen.index))
         .and_then(|object| nearest(&object.position_m, &case.positions_m));
+    let error_m = selected.map(|(_, error_m)| error_m);
+    let selected = selected.map(|(object, _)| object);
     let outcome = Outcome {
         kind: case.kind,
         clear: matches!(case.truth, Truth::One(_)),
@@ -109,6 +115,7 @@ pub fn run(case: &Case) -> (Grounding, Outcome) {
             Truth::One(object) | Truth::OneOfSeveral(object) => selected == Some(object),
             Truth::None => false,
         },
+        error_m,
         verdict: grounding.verdict,
         kappa: grounding.confidence,
         evidence: grounder::evidence(subtask, &scene, &Context::default()),
@@ -116,7 +123,10 @@ pub fn run(case: &Case) -> (Grounding, Outcome) {
     (grounding, outcome)
 }
 
-fn nearest(position: &[f64; 3], all: &[[f64; 3]]) -> Option<usize> {
+/// The true object that a reported position belongs to, and how far off it is,
+/// m: the nearest within the tracker's gate. Which instance is meant is one
+/// question, where exactly it stands another.
+fn nearest(position: &[f64; 3], all: &[[f64; 3]]) -> Option<(usize, f64)> {
     let distance = |other: &[f64; 3]| -> f64 {
         position
             .iter()
@@ -130,5 +140,5 @@ fn nearest(position: &[f64; 3], all: &[[f64; 3]]) -> Option<usize> {
         .map(distance)
         .enumerate()
         .min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (best < 0.06).then_some(index)
+    (best < TrackParams::default().gate_m).then_some((index, best))
 }
