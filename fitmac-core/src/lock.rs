@@ -4,7 +4,7 @@
 //! The lock moves in one place only, `Lock::commit`, which the controller
 //! calls in a query whose route is target correction.
 
-use kinematics::vector;
+use kinematics::vector::{self, Vector3};
 
 use crate::{
     evidence,
@@ -51,6 +51,13 @@ pub struct Binding {
     pub confirmed: bool,
     confidence: f64,
     compatible: bool,
+}
+
+/// Where the hand and the locked target were in one sample, base frame, m.
+#[derive(Clone, Copy)]
+pub(crate) struct Sighting {
+    hand_m: Vector3,
+    target_m: Vector3,
 }
 
 /// The lock on the target.
@@ -140,21 +147,25 @@ impl Lock {
         &mut self,
         params: &LockParams,
         gripper: &Gripper,
-        before: &StateSample,
-        after: &StateSample,
+        before: Option<Sighting>,
+        after: Option<Sighting>,
     ) {
-        let target = self.target();
-        let (Some(a), Some(b)) = (robot::object(before, target), robot::object(after, target))
-        else {
+        let (Some(a), Some(b)) = (before, after) else {
             return;
         };
-        let far = |ee, p| vector::distance(ee, p) > gripper.held_radius_m;
-        if vector::distance(a.position_m, b.position_m) > params.jump_m
-            && far(before.ee_position_m, a.position_m)
-            && far(after.ee_position_m, b.position_m)
-        {
+        let far = |s: &Sighting| vector::distance(s.hand_m, s.target_m) > gripper.held_radius_m;
+        if vector::distance(a.target_m, b.target_m) > params.jump_m && far(&a) && far(&b) {
             self.jumped = true;
         }
+    }
+
+    /// Where the target is in `sample`, if it is there.
+    pub(crate) fn sighting(&self, sample: &StateSample) -> Option<Sighting> {
+        let object = robot::object(sample, self.target())?;
+        Some(Sighting {
+            hand_m: sample.ee_position_m,
+            target_m: object.position_m,
+        })
     }
 
     /// Confidence kappa of the binding at `now_ns`: 0 without a lock, and 0 if

@@ -54,17 +54,17 @@ impl Controller {
 
     fn take_state(&mut self, now_ns: u64, sample: &StateSample, report: &mut Report) {
         let (state, params) = (&mut self.state, self.params.get());
-        let before = *state.robot.latest().unwrap_or(sample);
+        let lock = &state.subtask.lock;
+        let before = lock.sighting(state.robot.latest().unwrap_or(sample));
         match state.robot.step(&params.state, now_ns, sample) {
             robot::Outcome::Accepted { discontinuous } => {
                 state.applied.note(now_ns, sample.applied_command);
                 if discontinuous {
                     state.subtask.forget_motion();
                 } else if let Some(after) = state.robot.latest() {
-                    state
-                        .subtask
-                        .lock
-                        .watch(&params.lock, &params.gripper, &before, after);
+                    let lock = &mut state.subtask.lock;
+                    let after = lock.sighting(after);
+                    lock.watch(&params.lock, &params.gripper, before, after);
                 }
             }
             robot::Outcome::Duplicate => {}

@@ -90,15 +90,56 @@ impl RobotIntake {
         self.jumps = 0;
         self.jumped = None;
         self.numbered = Some((sample.session, sample.sequence));
-        let kept = self.latest.insert(*sample);
-        // Unused slots may hold anything; a snapshot must equal itself.
-        let used = kept.object_count as usize;
-        kept.objects
-            .iter_mut()
-            .skip(used)
-            .for_each(|o| *o = ObjectSample::default());
+        self.keep(sample);
         Outcome::Accepted {
             discontinuous: restarted || jumped,
+        }
+    }
+
+    /// Copies the objects in use only: a full sample has room for 32. The other
+    /// slots may hold anything; they are emptied, as a snapshot must equal itself.
+    fn keep(&mut self, sample: &StateSample) {
+        let Some(kept) = &mut self.latest else {
+            let kept = self.latest.insert(*sample);
+            let unused = kept.objects.iter_mut().skip(sample.object_count as usize);
+            unused.for_each(|o| *o = ObjectSample::default());
+            return;
+        };
+        let used_before = kept.object_count as usize;
+        // All fields are named, so that a new one cannot be forgotten.
+        let StateSample {
+            sequence,
+            session,
+            stamp_ns,
+            applied_command,
+            joint_position_rad,
+            joint_velocity_rad_s,
+            ee_position_m,
+            ee_orientation,
+            ee_velocity_m_s,
+            gripper_width_m,
+            object_count,
+            reserved,
+            objects,
+        } = sample;
+        kept.sequence = *sequence;
+        kept.session = *session;
+        kept.stamp_ns = *stamp_ns;
+        kept.applied_command = *applied_command;
+        kept.joint_position_rad = *joint_position_rad;
+        kept.joint_velocity_rad_s = *joint_velocity_rad_s;
+        kept.ee_position_m = *ee_position_m;
+        kept.ee_orientation = *ee_orientation;
+        kept.ee_velocity_m_s = *ee_velocity_m_s;
+        kept.gripper_width_m = *gripper_width_m;
+        kept.object_count = *object_count;
+        kept.reserved = *reserved;
+        let used = *object_count as usize;
+        for (slot, object) in kept.objects.iter_mut().zip(objects).take(used) {
+            *slot = *object;
+        }
+        for slot in kept.objects.iter_mut().take(used_before).skip(used) {
+            *slot = ObjectSample::default();
         }
     }
 
