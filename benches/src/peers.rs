@@ -16,6 +16,11 @@ pub fn folder() -> PathBuf {
     benches.join("../target/bench-peers")
 }
 
+/// The root of the workspace.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
 /// A file that comes with the benchmarks.
 #[must_use]
 pub fn source(name: &str) -> PathBuf {
@@ -92,6 +97,67 @@ pub fn ruckig() -> anyhow::Result<PathBuf> {
         run(&mut gxx, GXX_REMEDY)
     })?;
     Ok(library)
+}
+
+/// The control loop in C of the benchmark `ffi`: a shared library.
+///
+/// # Errors
+/// Where the compiler is missing or fails.
+pub fn ffi_loop() -> anyhow::Result<PathBuf> {
+    let code = source("ffi_loop.c");
+    let header = root().join("fitmac-capi/include");
+    let built = folder().join("ffi-loop");
+    let library = built.join("libffi_loop.so");
+    let made_from = read(&code)? + &read(&header.join("fitmac.h"))?;
+    once(&built, &made_from, || {
+        let mut cc = Command::new("cc");
+        cc.args(["-std=c11", "-O2", "-fPIC", "-shared", "-o"]);
+        cc.arg(&library).arg("-I").arg(&header).arg(&code);
+        run(&mut cc, "check that a C compiler is installed as cc")
+    })?;
+    Ok(library)
+}
+
+/// The interpreter of the test oracles' environment.
+///
+/// # Errors
+/// Where there is none, with the remedy.
+pub fn python() -> anyhow::Result<PathBuf> {
+    let environment = std::env::var_os("FITMAC_VENV");
+    let environment = environment.map_or_else(|| root().join(".venv"), PathBuf::from);
+    let python = environment.join("bin/python");
+    if !python.exists() {
+        bail!(
+            "no Python with numpy and maturin at {}: run `cargo xtask test`, which makes it, or \
+             leave Python out with --no-python",
+            python.display()
+        );
+    }
+    Ok(python)
+}
+
+/// The Python package, installed by pip from this tree, optimised: a folder of packages.
+///
+/// # Errors
+/// Where there is no Python, or the package does not build.
+pub fn python_package() -> anyhow::Result<PathBuf> {
+    step("Building the Python package (a minute or two where it has changed)");
+    let packages = folder().join("python-packages");
+    let python = python()?;
+    let tools = python.parent().unwrap_or(&python).as_os_str().to_owned();
+    let mut path = tools;
+    path.push(":");
+    path.push(std::env::var_os("PATH").unwrap_or_default());
+    let mut pip = Command::new(&python);
+    pip.args(["-m", "pip", "--disable-pip-version-check", "install"]);
+    pip.args(["--quiet", "--no-deps", "--no-build-isolation", "--upgrade"]);
+    pip.arg("--target").arg(&packages).arg(".");
+    pip.current_dir(root()).env("PATH", path);
+    run(
+        &mut pip,
+        "run `cargo xtask test` once, which installs what it needs",
+    )?;
+    Ok(packages)
 }
 
 /// Ruckig's own source files: not its Python module and not its client of an online service.

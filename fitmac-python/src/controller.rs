@@ -1,7 +1,7 @@
 //! The controller.
 
 use fitmac_core::{
-    Controller as Core, State,
+    Controller as Core, State, ValidParams,
     message::{
         ActionChunk, Command, CriticReport, GroundingRecord, Input, ObjectSample, Plan,
         PolicyQuery, RebindRequest, StateSample, TraceRecord, VerifierReport,
@@ -77,10 +77,11 @@ type Answer<'py> = (
     Option<Bytes<'py>>,
 );
 
-/// What a controller remembers.
+/// What a controller remembers, and the parameters that it had.
 #[pyclass(frozen)]
 pub(crate) struct Snapshot {
     state: State,
+    params: ValidParams,
 }
 
 /// Watches the policy and decides who acts.
@@ -140,13 +141,22 @@ impl Controller {
 
     /// What the controller remembers now.
     fn snapshot(&self) -> Snapshot {
-        let state = self.core.state().clone();
-        Snapshot { state }
+        Snapshot {
+            state: self.core.state().clone(),
+            params: *self.core.params(),
+        }
     }
 
-    /// Goes on from a snapshot of a controller with the same parameters.
-    fn restore(&mut self, snapshot: &Snapshot) {
+    /// Goes on from a snapshot of a controller with the same parameters; raises
+    /// a `ValueError` for others.
+    fn restore(&mut self, snapshot: &Snapshot) -> PyResult<()> {
+        if snapshot.params.get() != self.core.params().get() {
+            return Err(PyValueError::new_err(
+                "snapshot: it is of a controller with other parameters",
+            ));
+        }
         self.core.restore(snapshot.state.clone());
+        Ok(())
     }
 
     /// As new: forgets everything but its parameters.

@@ -5,16 +5,19 @@
 mod arm;
 mod config;
 mod controller;
+mod motion;
 mod words;
 
 #[pyo3::pymodule]
 mod _fitmac {
     #[pymodule_export]
-    use super::arm::{panda_forward, panda_jacobian};
+    use super::arm::{panda_constants, panda_forward, panda_inverse, panda_jacobian};
     #[pymodule_export]
     use super::config::{Config, parameters};
     #[pymodule_export]
     use super::controller::{Controller, Snapshot, sizes};
+    #[pymodule_export]
+    use super::motion::Motion;
     #[pymodule_export]
     use super::words::{bits, vocabularies};
 }

@@ -4,9 +4,12 @@ from typing import final
 __all__ = [
     "Config",
     "Controller",
+    "Motion",
     "Snapshot",
     "bits",
+    "panda_constants",
     "panda_forward",
+    "panda_inverse",
     "panda_jacobian",
     "parameters",
     "sizes",
@@ -50,3 +53,31 @@ def panda_forward(q: Sequence[float]) -> tuple[list[float], list[float]]:
 
 def panda_jacobian(q: Sequence[float]) -> list[list[float]]:
     """The 6 x 7 geometric Jacobian of the tool centre point, base frame."""
+
+def panda_inverse(
+    position: Sequence[float],
+    orientation: Sequence[float],
+    seed: Sequence[float],
+    restarts: int,
+    position_tolerance_m: float,
+    rotation_tolerance_rad: float,
+) -> tuple[bool, list[float], float, float, int] | None: ...
+def panda_constants() -> list[list[float]]: ...
+@final
+class Motion:
+    def __new__(
+        cls,
+        position: Sequence[float],
+        velocity: Sequence[float],
+        acceleration: Sequence[float],
+        target: Sequence[float],
+        target_velocity: Sequence[float],
+        velocity_max: Sequence[float],
+        acceleration_max: Sequence[float],
+        jerk_max: Sequence[float],
+    ) -> Motion: ...
+    @property
+    def duration_s(self) -> float: ...
+    @property
+    def synchronised(self) -> bool: ...
+    def at(self, time_s: float) -> list[list[float]]: ...

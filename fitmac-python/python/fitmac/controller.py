@@ -110,11 +110,18 @@ class Controller:
         )
 
     def snapshot(self) -> Snapshot:
-        """What the controller remembers now."""
+        """What the controller remembers now.
+
+        It lives as long as this process: it cannot be pickled. To go on in
+        another one, replay the inputs.
+        """
         return self._raw.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Goes on from a snapshot of a controller with the same parameters."""
+        """Goes on from a snapshot of a controller with the same parameters.
+
+        Raises ValueError for a snapshot of one with others.
+        """
         self._raw.restore(snapshot)
 
     def reset(self) -> None:
