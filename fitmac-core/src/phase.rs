@@ -2,7 +2,7 @@
 
 use crate::{
     params::PhaseParams,
-    signals::{GripperState, Signals, TargetView},
+    signals::{GripperState, Signals},
     wire::Phase,
 };
 
@@ -160,31 +160,39 @@ impl PhaseEstimator {
         if self.phase == Phase::Complete {
             return Change::None;
         }
-        if let Some(target) = &signals.target {
-            self.follow(params, signals, target);
-        }
+        self.follow(params, signals);
         let estimate = self.estimate(params, signals);
         self.settle_on(params, estimate)
     }
 
     /// Updates how the target relates to the attempt.
-    fn follow(&mut self, params: &PhaseParams, signals: &Signals, target: &TargetView) {
-        let z = target.position_m[2];
+    fn follow(&mut self, params: &PhaseParams, signals: &Signals) {
+        let z = signals.target.map(|t| t.position_m[2]);
         let open = signals.gripper.state == GripperState::Open;
-        self.carry = match self.carry {
-            Carry::Resting { .. } if open => Carry::Resting {
-                rest_z_m: Some(z),
+        self.carry = match (self.carry, z) {
+            // An open hand carries nothing, whether the target is seen or not.
+            // Let go before the carry began: the lift has failed.
+            (Carry::Lifted { .. }, _) if open && is_pick(self.phase) => Carry::Resting {
+                rest_z_m: None,
                 risen_steps: 0,
             },
-            Carry::Resting { rest_z_m: None, .. } => Carry::Resting {
-                rest_z_m: Some(z),
-                risen_steps: 0,
-            },
-            Carry::Resting {
-                rest_z_m: Some(rest),
-                risen_steps,
-            } => {
-                let risen = z - rest > params.lifted_m && signals.gripper.is_closed();
+            (Carry::Lifted { .. }, _) if open => Carry::Released,
+            (carry, None) => carry,
+            (Carry::Resting { rest_z_m, .. }, Some(z)) if open || rest_z_m.is_none() => {
+                Carry::Resting {
+                    rest_z_m: Some(z),
+                    risen_steps: 0,
+                }
+            }
+            (
+                Carry::Resting {
+                    rest_z_m,
+                    risen_steps,
+                },
+                Some(z),
+            ) => {
+                let risen = rest_z_m.is_some_and(|rest| z - rest > params.lifted_m)
+                    && signals.gripper.is_closed();
                 let steps = if risen { risen_steps + 1 } else { 0 };
                 if steps >= params.hysteresis_steps {
                     Carry::Lifted {
@@ -193,22 +201,16 @@ impl PhaseEstimator {
                     }
                 } else {
                     Carry::Resting {
-                        rest_z_m: Some(rest),
+                        rest_z_m,
                         risen_steps: steps,
                     }
                 }
             }
-            // Let go before the carry began: the lift has failed.
-            Carry::Lifted { .. } if open && is_pick(self.phase) => Carry::Resting {
-                rest_z_m: None,
-                risen_steps: 0,
-            },
-            Carry::Lifted { .. } if open => Carry::Released,
-            Carry::Lifted { top_z_m, grip_z_m } => Carry::Lifted {
+            (Carry::Lifted { top_z_m, grip_z_m }, Some(z)) => Carry::Lifted {
                 top_z_m: top_z_m.max(z),
                 grip_z_m,
             },
-            Carry::Released => Carry::Released,
+            (Carry::Released, _) => Carry::Released,
         };
     }
 

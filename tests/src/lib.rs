@@ -6,8 +6,10 @@ pub mod docs;
 pub mod fitmac;
 pub mod invariants;
 pub mod link;
+pub mod model;
 #[cfg(feature = "programs")]
 pub mod openpi;
 pub mod oracle;
+pub mod soak;
 pub mod swarm;
 pub mod world;

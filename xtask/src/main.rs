@@ -63,6 +63,8 @@ enum Command {
     Swarm(cmd::swarm::Args),
     /// Feed the core raw bytes and check every tick (a minute; `--minutes N`).
     Fuzz(cmd::fuzz::Args),
+    /// Compare the core with a second one, tick by tick (10 million ticks: two minutes).
+    Soak(cmd::soak::Args),
     /// Say what the machine lacks to build and test.
     Doctor(cmd::doctor::Args),
 }
@@ -81,6 +83,7 @@ fn main() -> ExitCode {
         Command::Docs(args) => cmd::docs::run(&workspace, &args),
         Command::Swarm(args) => cmd::swarm::run(&workspace, &args),
         Command::Fuzz(args) => cmd::fuzz::run(&workspace, &args),
+        Command::Soak(args) => cmd::soak::run(&workspace, &args),
         Command::Doctor(args) => cmd::doctor::run(&workspace, &args),
     };
     match result {

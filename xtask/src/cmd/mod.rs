@@ -9,5 +9,6 @@ pub(crate) mod doctor;
 pub(crate) mod fuzz;
 pub(crate) mod install;
 pub(crate) mod setup;
+pub(crate) mod soak;
 pub(crate) mod swarm;
 pub(crate) mod test;

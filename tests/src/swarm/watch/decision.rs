@@ -6,6 +6,7 @@ use fitmac_core::{
     message::Command,
     phase::{is_legal, is_pick, is_place},
     reason,
+    signals::GripperState,
     wire::{Mode, Route, SubPhase},
 };
 
@@ -130,8 +131,11 @@ pub(super) fn phases(seen: &Seen<'_>) -> Result<(), Broken> {
         || format!("{from} to {to}"),
     )?;
     let subtask = seen.after.subtask();
-    let carries =
-        subtask.estimator().is_lifted() && subtask.signals().is_some_and(|s| s.gripper.is_closed());
+    // Closed is what does not open: fingers may still give way to the object.
+    let held = subtask
+        .signals()
+        .is_some_and(|s| s.gripper.state != GripperState::Open);
+    let carries = subtask.estimator().is_lifted() && held;
     require(
         !(is_pick(from) && is_place(to)) || carries,
         "44: a place phase begins only with carrying evidence",
