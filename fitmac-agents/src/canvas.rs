@@ -53,7 +53,65 @@ pub struct SizeMismatch {
     given: usize,
 }
 
+/// An image that can't be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// No PNG.
+    #[error("isn't a PNG that can be read: {0}")]
+    Png(#[from] png::DecodingError),
+    /// Larger than what is read.
+    #[error("is {width_px} x {height_px} px, at most {SIDE_CAP_PX} px a side are read")]
+    TooLarge {
+        /// Its width, px.
+        width_px: u32,
+        /// Its height, px.
+        height_px: u32,
+    },
+    /// Samples of a kind that isn't read.
+    #[error("has pixels of the kind {0:?}, 8 bits of grey, RGB or RGBA are read")]
+    Kind(png::ColorType),
+}
+
+/// Largest side of an image that is read, px.
+pub const SIDE_CAP_PX: u32 = 4096;
+
 impl Canvas {
+    /// Reads a PNG; transparency is dropped.
+    ///
+    /// # Errors
+    /// [`ReadError`] says why it can't be used.
+    pub fn from_png(bytes: &[u8]) -> Result<Self, ReadError> {
+        let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
+        decoder.set_transformations(png::Transformations::normalize_to_color8());
+        let mut reader = decoder.read_info()?;
+        let (width_px, height_px) = (reader.info().width, reader.info().height);
+        if width_px > SIDE_CAP_PX || height_px > SIDE_CAP_PX {
+            return Err(ReadError::TooLarge {
+                width_px,
+                height_px,
+            });
+        }
+        let mut data = vec![0; reader.output_buffer_size().unwrap_or_default()];
+        let frame = reader.next_frame(&mut data)?;
+        let samples = frame.color_type.samples();
+        let pixels = match frame.color_type {
+            png::ColorType::Grayscale | png::ColorType::GrayscaleAlpha => data
+                .chunks_exact(samples)
+                .flat_map(|pixel| [pixel[0]; 3])
+                .collect(),
+            png::ColorType::Rgb | png::ColorType::Rgba => data
+                .chunks_exact(samples)
+                .flat_map(|pixel| [pixel[0], pixel[1], pixel[2]])
+                .collect(),
+            other @ png::ColorType::Indexed => return Err(ReadError::Kind(other)),
+        };
+        Ok(Self {
+            width_px,
+            height_px,
+            pixels,
+        })
+    }
+
     /// An image of one colour.
     #[must_use]
     pub fn filled(width_px: u32, height_px: u32, Colour(colour): Colour) -> Self {

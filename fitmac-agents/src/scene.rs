@@ -205,6 +205,28 @@ impl Scene {
         self.camera.as_ref().map_or(Ok(()), check_camera)
     }
 
+    /// Where an object is in the camera's image: its own box, or the box around
+    /// its projected corners; x, y, width, height, px.
+    #[must_use]
+    pub fn box_of(&self, object: &Detection) -> Option<[f64; 4]> {
+        if object.box_px.is_some() {
+            return object.box_px;
+        }
+        let camera = self.camera.as_ref()?;
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for corner in 0..8_u8 {
+            let side = |axis: usize| if corner >> axis & 1 == 1 { 0.5 } else { -0.5 };
+            let at: [f64; 3] =
+                std::array::from_fn(|a| object.position_m[a] + side(a) * object.size_m[a]);
+            let pixel = camera.project(at)?;
+            for axis in 0..2 {
+                low[axis] = low[axis].min(pixel[axis]);
+                high[axis] = high[axis].max(pixel[axis]);
+            }
+        }
+        Some([low[0], low[1], high[0] - low[0], high[1] - low[1]])
+    }
+
     /// Mean of the detector's confidence in the objects, 0 to 1; 0 without any.
     #[must_use]
     pub fn mean_confidence(&self) -> f64 {

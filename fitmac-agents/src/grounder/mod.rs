@@ -80,12 +80,12 @@ pub struct Seen {
 }
 
 impl Seen {
-    fn new(index: usize, detection: &Detection) -> Self {
+    fn new(index: usize, detection: &Detection, scene: &Scene) -> Self {
         Self {
             index,
             id: detection.id,
             label: detection.label.clone(),
-            box_px: detection.box_px,
+            box_px: scene.box_of(detection),
         }
     }
 }
@@ -178,7 +178,7 @@ pub fn ground(subtask: &Subtask, scene: &Scene, context: &Context<'_>) -> Ground
         .all()
         .enumerate()
         .filter(|(index, _)| !shown(*index))
-        .map(|(index, detection)| Seen::new(index, detection))
+        .map(|(index, detection)| Seen::new(index, detection, scene))
         .collect();
     let reason = reason(verdict, subtask, &candidates, selected_index);
     Grounding {
@@ -310,7 +310,7 @@ fn candidate(scene: &Scene, ranked: &Ranked) -> Option<Candidate> {
         return None;
     };
     Some(Candidate {
-        seen: Seen::new(index, scene.objects.get(index)?),
+        seen: Seen::new(index, scene.objects.get(index)?, scene),
         name_score: ranked.matched.fit,
         relation_score: ranked.relation,
         weight: ranked.weight,
@@ -338,7 +338,7 @@ fn reference_objects(
                 .iter()
                 .any(|candidate| candidate.seen.index == index);
         if let Some(detection) = pool.scene.all().nth(index).filter(|_| !known) {
-            found.push(Seen::new(index, detection));
+            found.push(Seen::new(index, detection, pool.scene));
         }
     }
     found

@@ -7,6 +7,8 @@
 mod calls;
 mod client;
 pub mod prompts;
+#[cfg(any(test, feature = "stand-in"))]
+pub mod stand_in;
 pub mod wire;
 
 #[cfg(test)]

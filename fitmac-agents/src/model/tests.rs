@@ -1,122 +1,24 @@
 //! Against a local server that speaks the protocol, well and badly.
 
-use std::io::{Read, Write};
-use std::net::{TcpListener, TcpStream};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::net::TcpListener;
 use std::time::Duration;
 
+use super::stand_in::{Manner, StandIn};
 use super::*;
 use crate::grounder::{Context, ground, resolver::ResolverOutput};
 use crate::planner::{PlannerOutput, plan};
 use crate::scene::{Detection, Scene};
 
-/// What the server does with each connection.
-#[derive(Clone, Copy)]
-enum Manner {
-    /// A completion with this content.
-    Content(&'static str),
-    /// This body.
-    Body(&'static str),
-    /// This status.
-    Status(u16),
-    /// An answer after a second.
-    Slow,
-    /// More than the limit, and more than announced.
-    Huge,
-    /// A body shorter than announced.
-    Cut,
-    /// 503 once, then a completion.
-    Recovers(&'static str),
-    /// Elsewhere, with the key.
-    Redirect,
+fn serve(manner: Manner) -> StandIn {
+    StandIn::start(manner).expect("a port")
 }
 
-struct Server {
-    url: String,
-    requests: Arc<AtomicUsize>,
+fn slow() -> Manner {
+    Manner::Slow(Duration::from_secs(1), "{}".to_owned())
 }
 
-fn serve(manner: Manner) -> Server {
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let url = format!("http://{}/v1", listener.local_addr().expect("an address"));
-    let requests = Arc::new(AtomicUsize::new(0));
-    let count = requests.clone();
-    std::thread::spawn(move || {
-        for stream in listener.incoming().flatten() {
-            let number = count.fetch_add(1, Ordering::SeqCst);
-            std::thread::spawn(move || answer(stream, manner, number));
-        }
-    });
-    Server { url, requests }
-}
-
-fn completion(content: &str) -> String {
-    serde_json::json!({
-        "id": "x", "object": "chat.completion",
-        "choices": [{"index": 0, "finish_reason": "stop",
-                     "message": {"role": "assistant", "content": content}}],
-        "usage": {"total_tokens": 5}
-    })
-    .to_string()
-}
-
-fn read_request(stream: &mut TcpStream) {
-    let (mut seen, mut buffer) = (Vec::new(), [0; 4096]);
-    loop {
-        let Ok(count) = stream.read(&mut buffer) else {
-            return;
-        };
-        seen.extend_from_slice(&buffer[..count]);
-        let text = String::from_utf8_lossy(&seen);
-        if let Some((head, body)) = text.split_once("\r\n\r\n") {
-            let length = head
-                .lines()
-                .find_map(|line| {
-                    line.to_lowercase()
-                        .strip_prefix("content-length:")
-                        .map(str::to_owned)
-                })
-                .and_then(|value| value.trim().parse::<usize>().ok())
-                .unwrap_or(0);
-            if body.len() >= length {
-                return;
-            }
-        }
-        if count == 0 {
-            return;
-        }
-    }
-}
-
-fn answer(mut stream: TcpStream, manner: Manner, number: usize) {
-    read_request(&mut stream);
-    let reply = |status: u16, body: &str| {
-        format!(
-            "HTTP/1.1 {status} X\r\ncontent-type: application/json\r\ncontent-length: {}\r\nconnection: close\r\n\r\n{body}",
-            body.len()
-        )
-    };
-    let text = match manner {
-        Manner::Content(content) => reply(200, &completion(content)),
-        Manner::Body(body) => reply(200, body),
-        Manner::Status(status) => reply(status, "{}"),
-        Manner::Slow => {
-            std::thread::sleep(Duration::from_millis(1000));
-            reply(200, &completion("{}"))
-        }
-        Manner::Huge => reply(200, &completion(&"x".repeat(300_000))),
-        Manner::Cut => {
-            reply(200, &completion("{}")).replace("content-length: ", "content-length: 9")
-        }
-        Manner::Recovers(_) if number == 0 => reply(503, "{}"),
-        Manner::Recovers(content) => reply(200, &completion(content)),
-        Manner::Redirect => {
-            "HTTP/1.1 307 X\r\nlocation: http://127.0.0.1:9/steal\r\ncontent-length: 0\r\n\r\n"
-                .to_owned()
-        }
-    };
-    let _ = stream.write_all(text.as_bytes());
+fn body(text: &str) -> Manner {
+    Manner::Body(text.to_owned())
 }
 
 fn model(url: &str) -> ChatModel {
@@ -130,31 +32,31 @@ fn model(url: &str) -> ChatModel {
 
 fn ask(manner: Manner) -> (Result<String, ModelError>, u32, usize) {
     let server = serve(manner);
-    let (answer, attempts) = model(&server.url).ask("system", "user", None, &Cancel::default());
-    (answer, attempts, server.requests.load(Ordering::SeqCst))
+    let (answer, attempts) = model(server.url()).ask("system", "user", None, &Cancel::default());
+    (answer, attempts, server.asked().len())
 }
 
 #[test]
 fn each_kind_of_answer_has_its_outcome() {
-    let ok = ask(Manner::Content("{\"a\":1}"));
+    let ok = ask(Manner::Content("{\"a\":1}".to_owned()));
     assert_eq!((ok.0.as_deref(), ok.1), (Ok("{\"a\":1}"), 1));
     let outcome = |manner| ask(manner).0.expect_err("a failure").outcome();
-    assert_eq!(outcome(Manner::Body("<html>")), "protocol");
-    assert_eq!(outcome(Manner::Body("{\"choices\":[]}")), "protocol");
-    assert_eq!(outcome(Manner::Huge), "too_large");
+    assert_eq!(outcome(body("<html>")), "protocol");
+    assert_eq!(outcome(body("{\"choices\":[]}")), "protocol");
+    assert_eq!(outcome(Manner::Huge(300_000)), "too_large");
     assert_eq!(outcome(Manner::Status(401)), "status");
     assert_eq!(outcome(Manner::Redirect), "status");
     let refusal = r#"{"choices":[{"message":{"refusal":"no"},"finish_reason":"stop"}]}"#;
-    assert_eq!(outcome(Manner::Body(refusal)), "refused");
+    assert_eq!(outcome(body(refusal)), "refused");
     let length = r#"{"choices":[{"message":{"content":"{\"sel"},"finish_reason":"length"}]}"#;
-    assert_eq!(outcome(Manner::Body(length)), "truncated");
+    assert_eq!(outcome(body(length)), "truncated");
     let cut = outcome(Manner::Cut);
     assert!(matches!(cut, "protocol" | "timeout"), "{cut}");
 }
 
 #[test]
 fn passing_failures_are_tried_again_and_others_are_not() {
-    let (answer, attempts, requests) = ask(Manner::Recovers("{}"));
+    let (answer, attempts, requests) = ask(Manner::Recovers("{}".to_owned()));
     assert_eq!((answer.as_deref(), attempts, requests), (Ok("{}"), 2, 2));
     let (answer, attempts, requests) = ask(Manner::Status(500));
     assert_eq!(
@@ -166,7 +68,7 @@ fn passing_failures_are_tried_again_and_others_are_not() {
         (answer, attempts, requests),
         (Err(ModelError::Status(400)), 1, 1)
     );
-    let (answer, attempts, _) = ask(Manner::Slow);
+    let (answer, attempts, _) = ask(slow());
     assert_eq!((answer, attempts), (Err(ModelError::Timeout), 2));
 }
 
@@ -181,8 +83,8 @@ fn nobody_at_home_is_a_normal_answer() {
 
 #[test]
 fn a_cancelled_call_gives_no_answer_and_polling_never_waits() {
-    let server = serve(Manner::Slow);
-    let mut calls = Calls::new(model(&server.url));
+    let server = serve(slow());
+    let mut calls = Calls::new(model(server.url()));
     let question = || Question {
         system: "s",
         user: "u".to_owned(),

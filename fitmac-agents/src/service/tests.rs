@@ -1,8 +1,7 @@
-use std::io::{Read, Write};
-use std::net::TcpListener;
 use std::time::Duration;
 
 use super::*;
+use crate::model::stand_in::{Manner, StandIn};
 use crate::model::{ChatModel, ModelConfig};
 use crate::scene::Detection;
 
@@ -150,33 +149,30 @@ fn what_is_not_understood_keeps_the_users_words() {
     assert!(records(&events).is_empty());
 }
 
-/// A server that gives every question the same content after `delay`.
-fn server(content: &'static str, delay: Duration) -> Calls {
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let url = format!("http://{}/v1", listener.local_addr().expect("an address"));
-    std::thread::spawn(move || {
-        for mut stream in listener.incoming().flatten() {
-            std::thread::spawn(move || {
-                let mut buffer = [0; 65536];
-                let _ = stream.read(&mut buffer);
-                std::thread::sleep(delay);
-                let body = serde_json::json!({"choices": [{"message": {"content": content}}]});
-                let body = body.to_string();
-                let head = "HTTP/1.1 200 OK\r\nconnection: close\r\ncontent-length:";
-                let _ = write!(stream, "{head} {}\r\n\r\n{body}", body.len());
-            });
-        }
-    });
+fn calls_to(manner: Manner) -> (Calls, StandIn) {
+    let server = StandIn::start(manner).expect("a port");
     let config = ModelConfig {
         attempt_ms: 400,
         attempts: 1,
-        ..ModelConfig::new(&url, "m")
+        ..ModelConfig::new(server.url(), "m")
     };
-    Calls::new(ChatModel::new(config).expect("no key"))
+    (Calls::new(ChatModel::new(config).expect("no key")), server)
+}
+
+/// A server that gives every question the same content after `delay`.
+fn server(content: &str, delay: Duration) -> Calls {
+    calls_to(Manner::Slow(delay, content.to_owned())).0
 }
 
 fn wait_for_call(service: &mut AgentService) -> (Vec<Event>, CallRecord) {
-    let mut all = Vec::new();
+    wait_for_call_after(service, Vec::new())
+}
+
+/// As above, with what was polled before: an answer may be quick.
+fn wait_for_call_after(
+    service: &mut AgentService,
+    mut all: Vec<Event>,
+) -> (Vec<Event>, CallRecord) {
     for tick in 0..400 {
         all.extend(service.poll(1000 + tick));
         let call = all.iter().find_map(|event| match event {
@@ -203,9 +199,10 @@ fn a_model_settles_what_the_rules_leave_open() {
         .expect("s");
     service.on_scene(1, &scene(0, &TWO), None).expect("sound");
     // The rules' record is there before the model's.
-    let before = *records(&service.poll(2)).first().expect("a record");
+    let first = service.poll(2);
+    let before = *records(&first).first().expect("a record");
     assert!(before.confidence < 0.7);
-    let (events, call) = wait_for_call(&mut service);
+    let (events, call) = wait_for_call_after(&mut service, first);
     assert_eq!((call.role, call.outcome), (Role::Resolver, "ok"));
     let after = *records(&events).last().expect("a record");
     assert_eq!(
@@ -220,40 +217,142 @@ fn a_model_settles_what_the_rules_leave_open() {
     assert!(later.confidence > 0.7);
 }
 
+fn body(message: &str, finish: &str) -> Manner {
+    let body = format!(r#"{{"choices":[{{"message":{message},"finish_reason":"{finish}"}}]}}"#);
+    Manner::Body(body)
+}
+
+fn content(content: &str) -> Manner {
+    Manner::Content(content.to_owned())
+}
+
+/// Ways to answer badly that are the same for every role, and what is recorded.
+fn bad_answers() -> Vec<(Manner, &'static [&'static str])> {
+    let valid = r#"{"selected_index":1,"confidence":1,"reason":""}"#.to_owned();
+    vec![
+        (content("I would choose the second one."), &["schema"]),
+        (content(""), &["schema"]),
+        (Manner::Body("<html>".to_owned()), &["protocol"]),
+        (
+            Manner::Slow(Duration::from_millis(900), valid),
+            &["timeout"],
+        ),
+        (Manner::Hang, &["timeout"]),
+        (Manner::Huge(300_000), &["too_large"]),
+        (
+            body(r#"{"refusal":"I can't do that"}"#, "stop"),
+            &["refused"],
+        ),
+        (body(r#"{"content":""}"#, "content_filter"), &["refused"]),
+        (body(r#"{"content":"{\"sel"}"#, "length"), &["truncated"]),
+        // The announced end never comes: a cut stream or a wait, by the timing.
+        (Manner::Cut, &["protocol", "timeout"]),
+        (Manner::Status(500), &["status"]),
+        (Manner::Status(401), &["status"]),
+        (Manner::Redirect, &["status"]),
+    ]
+}
+
 #[test]
-fn a_hostile_or_slow_model_changes_nothing() {
-    for (content, delay, outcome) in [
-        (
-            r#"{"selected_index":7,"confidence":1,"reason":"take the knife"}"#,
-            0,
-            "schema",
-        ),
-        (
-            r#"{"selected_index":1,"confidence":1,"reason":"","epoch":99}"#,
-            0,
-            "schema",
-        ),
-        ("I would choose the second one.", 0, "schema"),
-        (
-            r#"{"selected_index":1,"confidence":1,"reason":""}"#,
-            900,
-            "timeout",
-        ),
+fn a_bad_choice_changes_nothing_and_is_recorded() {
+    let mut answers = bad_answers();
+    for hostile in [
+        r#"{"selected_index":7,"confidence":1,"reason":"take the knife"}"#,
+        r#"{"selected_index":-1,"confidence":1,"reason":""}"#,
+        r#"{"selected_index":1,"confidence":1,"reason":"","epoch":99}"#,
+        r#"{"selected_index":1,"confidence":1e9,"reason":""}"#,
+        r#"{"selected_index":1,"confidence":1,"reason":"","target_xyz":[0,0,0]}"#,
     ] {
-        let calls = server(content, Duration::from_millis(delay));
+        answers.push((content(hostile), &["schema"]));
+    }
+    for (manner, outcomes) in answers {
+        let (calls, _server) = calls_to(manner.clone());
         let mut service = AgentService::new(ServiceParams::default(), Some(calls));
         service
             .on_instruction(0, "pick up the black bowl and place it on the plate")
             .expect("s");
         service.on_scene(1, &scene(0, &TWO), None).expect("sound");
-        let before = *records(&service.poll(2)).last().expect("a record");
-        let (events, call) = wait_for_call(&mut service);
-        assert_eq!(call.outcome, outcome, "{content}");
-        assert!(records(&events).is_empty());
+        let first = service.poll(2);
+        let before = *records(&first).first().expect("a record");
+        let (events, call) = wait_for_call_after(&mut service, first);
+        assert!(outcomes.contains(&call.outcome), "{manner:?}: {call:?}");
+        assert_eq!((call.role, call.attempts), (Role::Resolver, 1));
+        assert_eq!(records(&events).len(), 1, "the rules' own");
         service.on_scene(9, &scene(1, &TWO), None).expect("sound");
         let after = *records(&service.poll(10)).last().expect("a record");
         assert_eq!((after.target, after.epoch), (before.target, before.epoch));
     }
+}
+
+#[test]
+fn a_bad_plan_changes_nothing_and_is_recorded() {
+    let mut answers = bad_answers();
+    let plan = |target: &str, confidence: &str| {
+        content(&format!(
+            r#"{{"canonical_instruction":"open the {target}","plan":["open the {target}"],
+            "action":"open","target_object":"{target}","source_phrase":"","destination":"",
+            "destination_prep":"","destination_relation":null,"confidence":{confidence}}}"#
+        ))
+    };
+    // Not in the instruction; out of range; no better than the rules.
+    answers.push((plan("safe", "1.0"), &["schema"]));
+    answers.push((plan("plate", "2.0"), &["schema"]));
+    answers.push((plan("plate", "0.01"), &["not_better"]));
+    for (manner, outcomes) in answers {
+        let (calls, _server) = calls_to(manner.clone());
+        let mut service = AgentService::new(ServiceParams::default(), Some(calls));
+        service
+            .on_instruction(0, "polish the plate until it shines")
+            .expect("s");
+        let before = service.plan().cloned();
+        let (events, call) = wait_for_call(&mut service);
+        assert!(outcomes.contains(&call.outcome), "{manner:?}: {call:?}");
+        assert_eq!(call.role, Role::Planner);
+        let plans = events
+            .iter()
+            .filter(|event| matches!(event, Event::Plan(_)));
+        assert_eq!(plans.count(), 1, "the rules' own");
+        assert_eq!(service.plan().cloned(), before);
+    }
+}
+
+#[test]
+fn a_bad_critic_says_nothing_and_is_recorded() {
+    let mut answers = bad_answers();
+    for hostile in [
+        r#"{"failure_type":"explosion","reason":"","confidence":1,"evidence_tags":[]}"#,
+        r#"{"failure_type":"success","reason":"","confidence":1,"evidence_tags":[],"route":"exec"}"#,
+    ] {
+        answers.push((content(hostile), &["schema"]));
+    }
+    for (manner, outcomes) in answers {
+        let (calls, _server) = calls_to(manner.clone());
+        let mut service = AgentService::new(ServiceParams::default(), Some(calls));
+        service.on_instruction(0, NEAR_RAMEKIN).expect("s");
+        service.on_snapshot(1, &Snapshot::default(), FailureType::None, 0.5);
+        let (events, call) = wait_for_call(&mut service);
+        assert!(outcomes.contains(&call.outcome), "{manner:?}: {call:?}");
+        assert_eq!(call.role, Role::Critic);
+        assert!(!events.iter().any(|event| matches!(event, Event::Critic(_))));
+    }
+}
+
+#[test]
+fn a_critic_that_is_too_sure_is_clamped_and_the_rules_win() {
+    let sure = r#"{"failure_type":"success","reason":"","confidence":7,"evidence_tags":[]}"#;
+    let (calls, _server) = calls_to(content(sure));
+    let mut service = AgentService::new(ServiceParams::default(), Some(calls));
+    service.on_instruction(0, NEAR_RAMEKIN).expect("s");
+    service.on_snapshot(1, &Snapshot::default(), FailureType::None, 0.5);
+    let (events, call) = wait_for_call(&mut service);
+    assert_eq!(call.outcome, "ok");
+    let report = events.iter().find_map(|event| match event {
+        Event::Critic(report) => Some(*report),
+        _ => None,
+    });
+    let report = report.expect("a report");
+    let none = bind::critic_label(FailureType::None).code();
+    assert_eq!((report.label, report.confidence), (none, 0.5));
 }
 
 #[test]

@@ -4,12 +4,15 @@
 //! the poses from the state samples.
 
 use std::{
-    path::PathBuf,
+    fs::File,
+    io::Write as _,
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
 use anyhow::Context;
 use fitmac_agents::{
+    model::{CallRecord, Calls},
     scene::{Detection, Scene, Table},
     service::{AgentService, Event, ServiceParams},
 };
@@ -23,7 +26,7 @@ use fitmac_rt::{
 };
 use sim_harness::pose::Pose;
 
-use super::leave_control_core;
+use super::{leave_control_core, plan::ModelArgs};
 use crate::{
     card::Card,
     crew::Report,
@@ -43,8 +46,10 @@ const TABLE_HALF_M: [f64; 2] = [0.4, 0.55];
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Example:
   fitmac agents --instance cell --card scene.json
+  fitmac agents --instance cell --card scene.json --model-url http://127.0.0.1:8000/v1 --model qwen
 
-Rules only: no model is asked. `fitmac help sim` shows the whole set of processes.")]
+Rules first: a model, if one is named, is asked where the rules are unsure, in threads of its
+own; whatever becomes of a call is written to --calls as a JSON line. `fitmac help sim` shows the whole set of processes.")]
 pub(crate) struct Args {
     /// The running system to join.
     #[arg(long, default_value = "default")]
@@ -52,6 +57,11 @@ pub(crate) struct Args {
     /// The scene card that `fitmac sim` writes: the instruction, what things look like.
     #[arg(long, value_name = "FILE")]
     card: PathBuf,
+    #[command(flatten)]
+    model: ModelArgs,
+    /// Append a JSON line for every model call: who asked, when, how long, what came of it.
+    #[arg(long, value_name = "FILE", requires = "model_url")]
+    calls: Option<PathBuf>,
     /// The instruction, instead of the card's.
     #[arg(long, value_name = "TEXT")]
     instruction: Option<String>,
@@ -67,6 +77,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
         .as_ref()
         .unwrap_or(&card.instruction)
         .clone();
+    let calls = args.model.chat()?.map(Calls::new);
+    let record = args.calls.as_deref().map(call_file).transpose()?;
     let instance = Instance::named(&args.instance)?;
     let transport = Ipc::join(&instance)?;
     let session = Session::start();
@@ -77,10 +89,11 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
                 session: session.0,
                 ..ServiceParams::default()
             },
-            None,
+            calls,
         ),
         card,
         subtask: 0,
+        record,
     };
     let planned = agents.service.on_instruction(clock::now_ns(), &instruction);
     planned.map_err(|error| BadInput(error.to_string()))?;
@@ -106,6 +119,8 @@ struct Agents {
     card: Card,
     /// The subtask that the controller is at.
     subtask: u32,
+    /// Where model calls are recorded.
+    record: Option<File>,
 }
 
 impl Agents {
@@ -119,6 +134,24 @@ impl Agents {
             .on_scene(clock::now_ns(), &scene, None)
             .context("the scene as seen")?;
         Ok(true)
+    }
+
+    /// Keeps a call's record; a call that failed is also said.
+    fn recorded(&mut self, call: &CallRecord) -> anyhow::Result<()> {
+        if call.outcome != "ok" {
+            let role = format!("{:?}", call.role).to_lowercase();
+            eprintln!(
+                "fitmac agents: the model didn't help the {role}: {}",
+                call.outcome
+            );
+        }
+        if let Some(record) = &mut self.record {
+            let line = serde_json::to_string(call)? + "\n";
+            record
+                .write_all(line.as_bytes())
+                .context("the record of model calls")?;
+        }
+        Ok(())
     }
 
     /// Hears what the controller asks.
@@ -148,11 +181,19 @@ impl Agents {
                     self.endpoint.send_grounding(now_ns, &mut record)?;
                 }
                 Event::Critic(mut report) => self.endpoint.send_critic(now_ns, &mut report)?,
-                Event::Call(call) => eprintln!("model call: {call:?}"),
+                Event::Call(call) => self.recorded(&call)?,
             }
         }
         Ok(())
     }
+}
+
+fn call_file(path: &Path) -> anyhow::Result<File> {
+    File::options()
+        .create(true)
+        .append(true)
+        .open(path)
+        .with_context(|| BadInput(format!("--calls {}: can't be written", path.display())))
 }
 
 /// The scene as a detector with a clear view reports it.

@@ -4,9 +4,9 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use fitmac_agents::canvas::Canvas;
 use fitmac_agents::grounder::{self, Destination, Grounding, Viewpoint, resolver};
-use fitmac_agents::model::{Cancel, ChatModel};
-use fitmac_agents::planner::TaskPlan;
+use fitmac_agents::model::{Cancel, ChatModel, Question};
 use fitmac_agents::scene::Scene;
 
 use super::plan::ModelArgs;
@@ -20,12 +20,15 @@ const SCENE_CAP_BYTES: u64 = 1 << 20;
 #[command(after_help = "Examples:
   fitmac ground --scene scene.json \"pick up the bowl on the stove and place it on the plate\"
   fitmac ground --scene scene.json --json --viewpoint robot \"put the left mug on the plate\"
+  fitmac ground --scene scene.json --image camera.png --annotated marked.png \"take the mug\"
 
 A scene is a JSON object:
   {\"objects\": [{\"label\": \"black_bowl\", \"confidence\": 0.9,
                 \"position_m\": [0.5, 0.1, 0.03], \"size_m\": [0.11, 0.11, 0.05]}],
    \"fixtures\": [], \"table\": {\"centre_m\": [0.5, 0, 0], \"half_extent_m\": [0.4, 0.5]}}
-Positions are centres in the robot's base frame, in metres.
+Positions are centres in the robot's base frame, in metres. An object is drawn into the image
+where its box_px says, as [x, y, width, height]; without one, where the scene's camera sees it.
+A model is asked only where the rules leave the choice open; it sees the marked image.
 Exit status: 1 if no object is plainly meant.")]
 pub(crate) struct Args {
     /// The instruction.
@@ -43,6 +46,13 @@ pub(crate) struct Args {
     /// robot's.
     #[arg(long, value_enum, default_value_t)]
     viewpoint: View,
+    /// The camera's image as PNG, for the model: candidates are framed in red with
+    /// their number, references in green, the rest in blue.
+    #[arg(long, value_name = "PNG")]
+    image: Option<PathBuf>,
+    /// Write the marked image here.
+    #[arg(long, value_name = "PNG", requires = "image")]
+    annotated: Option<PathBuf>,
     #[command(flatten)]
     model: ModelArgs,
 }
@@ -60,6 +70,7 @@ enum View {
 /// Grounds and prints.
 pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
     let scene = read_scene(&args.scene)?;
+    let image = args.image.as_deref().map(read_image).transpose()?;
     let model = args.model.chat()?;
     let plan = super::plan::plan(&args.instruction, model.as_ref())?;
     let index = args.step.wrapping_sub(1);
@@ -79,8 +90,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
         excluded: &[],
     };
     let mut grounding = grounder::ground(step, &scene, &context);
+    if let (Some(image), Some(path)) = (&image, &args.annotated) {
+        write_annotated(path, image, &grounding)?;
+    }
     if let Some(model) = model.filter(|_| grounding.verdict.needs_resolver()) {
-        resolve(&mut grounding, &plan, index, &args.instruction, &model);
+        let question =
+            resolver::question(&plan, index, &args.instruction, &grounding, image.as_ref());
+        resolve(&mut grounding, &question, &model);
     }
     if args.json {
         println!("{}", serde_json::to_string_pretty(&grounding)?);
@@ -91,24 +107,41 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
     Ok(if plain { Exit::Done } else { Exit::Negative })
 }
 
-fn resolve(
-    grounding: &mut Grounding,
-    plan: &TaskPlan,
-    step: usize,
-    instruction: &str,
-    model: &ChatModel,
-) {
-    let question = resolver::question(plan, step, instruction, grounding, None);
-    let (answer, _) = model.ask(question.system, &question.user, None, &Cancel::default());
+fn resolve(grounding: &mut Grounding, question: &Question, model: &ChatModel) {
+    let png = question.png.as_deref();
+    let (answer, _) = model.ask(question.system, &question.user, png, &Cancel::default());
     let count = grounding.candidates.len();
     match answer.and_then(|answer| resolver::ResolverOutput::parse(&answer, count)) {
         Ok(choice) => {
-            grounding.apply(&choice);
+            if !grounding.apply(&choice) {
+                eprintln!("fitmac: the model's choice is plainly worse; the rules' answer stands");
+            }
         }
         Err(error) => {
             eprintln!("fitmac: the model didn't help: {error}; the rules' answer stands");
         }
     }
+}
+
+/// Largest image file that is read, bytes.
+const IMAGE_CAP_BYTES: u64 = 32 << 20;
+
+fn read_image(path: &Path) -> anyhow::Result<Canvas> {
+    let name = path.display();
+    let file = std::fs::File::open(path)
+        .with_context(|| BadInput(format!("--image {name}: can't be opened")))?;
+    let mut bytes = Vec::new();
+    file.take(IMAGE_CAP_BYTES)
+        .read_to_end(&mut bytes)
+        .with_context(|| BadInput(format!("--image {name}: can't be read")))?;
+    let image = Canvas::from_png(&bytes);
+    Ok(image.map_err(|error| BadInput(format!("--image {name}: {error}")))?)
+}
+
+fn write_annotated(path: &Path, image: &Canvas, grounding: &Grounding) -> anyhow::Result<()> {
+    let png = resolver::annotate(image, grounding).png()?;
+    std::fs::write(path, png)
+        .with_context(|| BadInput(format!("--annotated {}: can't be written", path.display())))
 }
 
 fn read_scene(path: &Path) -> anyhow::Result<Scene> {

@@ -27,7 +27,7 @@ pub(crate) struct Args {
 }
 
 /// A model to ask.
-#[derive(clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub(crate) struct ModelArgs {
     /// OpenAI-compatible address, up to and without /chat/completions.
     #[arg(long, requires = "model")]
