@@ -106,11 +106,7 @@ fn print(vision: Vision, cells: &BTreeMap<String, Cell>, lines: &[String]) {
     for (key, cell) in cells {
         println!(
             "{key} {:>6} {:>7} {:>13} {:>18} {:>15}",
-            cell.cases,
-            cell.unread,
-            cell.other_target,
-            cell.other_destination,
-            cell.sure_and_wrong
+            cell.cases, cell.unread, cell.other_target, cell.other_destination, cell.sure_and_wrong
         );
     }
     lines.iter().for_each(|line| println!("  {line}"));
