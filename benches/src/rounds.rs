@@ -43,14 +43,35 @@ pub fn race_prepared(
     prepare: &mut dyn FnMut(),
     contestants: &mut [&mut dyn FnMut()],
 ) -> Vec<Times> {
-    let mut times = vec![Vec::with_capacity(rounds); contestants.len()];
+    let mut batches: Vec<Batch<'_>> = Vec::new();
+    for run in contestants {
+        batches.push(Batch { calls, run });
+    }
+    race_batches(rounds, prepare, &mut batches)
+}
+
+/// Some calls of one contestant.
+pub struct Batch<'a> {
+    /// How many.
+    pub calls: usize,
+    /// Makes them.
+    pub run: &'a mut dyn FnMut(),
+}
+
+/// Runs every contestant's batch, whatever its length, once a round.
+pub fn race_batches(
+    rounds: usize,
+    prepare: &mut dyn FnMut(),
+    batches: &mut [Batch<'_>],
+) -> Vec<Times> {
+    let mut times = vec![Vec::with_capacity(rounds); batches.len()];
     // A few rounds before the first that counts: caches and branch predictors.
     for round in 0..rounds + 5 {
         prepare();
-        for (batch, times) in contestants.iter_mut().zip(&mut times) {
+        for (batch, times) in batches.iter_mut().zip(&mut times) {
             let start = Instant::now();
-            batch();
-            let taken = start.elapsed().as_nanos() as f64 / calls as f64;
+            (batch.run)();
+            let taken = start.elapsed().as_nanos() as f64 / batch.calls as f64;
             if round >= 5 {
                 times.push(taken);
             }

@@ -144,7 +144,7 @@ invariants! {
     62 Determinism "The same inputs give the same outputs and state, bit for bit, in every build profile." in LOOP_DETERMINISM, "tests/tests/core_replay.rs";
     63 Determinism "Any time and any input give a command; no panic can be reached." in LOOP_DETERMINISM, "tests/tests/no_panic.rs";
     64 Determinism "A tick allocates nothing." in "tests/tests/core_no_alloc.rs";
-    65 Determinism "A tick's instructions are bounded, and counted." in "benches/benches/core.rs";
+    65 Determinism "A tick's instructions are bounded, and counted." in "tests/tests/core_instructions.rs";
     66 Determinism "Messages have no padding and a fixed size; the state is small." in LOOP_DETERMINISM;
     67 Determinism "A restored snapshot goes on as if nothing had happened." in LOOP_DETERMINISM;
     68 Determinism "Parameters are checked once; each bound holds at its edge, and all violations are named at once." in LOOP_DETERMINISM;

@@ -10,6 +10,7 @@ pub mod model;
 #[cfg(feature = "programs")]
 pub mod openpi;
 pub mod oracle;
+pub mod replay;
 pub mod soak;
 pub mod swarm;
 pub mod world;

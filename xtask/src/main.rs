@@ -3,7 +3,7 @@
 //! One file a command in [`cmd`]. What the commands share: where things are
 //! ([`workspace`]), Python ([`python`]), MuJoCo's library ([`mujoco`]), the
 //! environment of the test oracles ([`oracles`]), a compiler for bare metal
-//! ([`bare_rust`]) and child processes ([`process`]).
+//! ([`bare_rust`]), the ticks that tools watch ([`ticks`]) and child processes ([`process`]).
 
 mod bare_rust;
 mod cmd;
@@ -11,6 +11,7 @@ mod mujoco;
 mod oracles;
 mod process;
 mod python;
+mod ticks;
 mod workspace;
 
 use std::{path::PathBuf, process::ExitCode};
@@ -55,6 +56,12 @@ enum Command {
     Bench(cmd::bench::Args),
     /// Build the core for two targets without an operating system (minutes).
     BareMetal(cmd::bare_metal::Args),
+    /// Compare the answers of four builds to the same inputs, bit for bit (minutes).
+    ReplayIdentity(cmd::replay_identity::Args),
+    /// Run ticks under the real-time sanitizer (nightly compiler, a minute).
+    Rtsan(cmd::rtsan::Args),
+    /// Print the deepest stack of a tick (a minute).
+    Stack(cmd::stack::Args),
     /// Build the C library and install it with its headers and package files.
     Install(cmd::install::Args),
     /// Write the documents that the code prints, or check them.
@@ -79,6 +86,9 @@ fn main() -> ExitCode {
         Command::Ci(args) => cmd::ci::run(&workspace, &args),
         Command::Bench(args) => cmd::bench::run(&workspace, &args),
         Command::BareMetal(args) => cmd::bare_metal::run(&workspace, &args),
+        Command::ReplayIdentity(args) => cmd::replay_identity::run(&workspace, &args),
+        Command::Rtsan(args) => cmd::rtsan::run(&workspace, &args),
+        Command::Stack(args) => cmd::stack::run(&workspace, &args),
         Command::Install(args) => cmd::install::run(&workspace, &args),
         Command::Docs(args) => cmd::docs::run(&workspace, &args),
         Command::Swarm(args) => cmd::swarm::run(&workspace, &args),
