@@ -2,6 +2,7 @@
 //! rules that are written down one by one.
 
 use super::*;
+use crate::{route::route, wire::Route};
 
 const SWITCHES: u8 = 16;
 
@@ -16,15 +17,17 @@ fn switches(bits: u8) -> Switches {
 
 const ROUTINES: [Routine; 3] = [Routine::Pick, Routine::Place, Routine::Indirect];
 const KAPPAS: [f64; 5] = [f64::NAN, 0.0, 0.119_999, 0.12, 1.0];
-const FAILURES: [Option<(FailureKind, u8)>; 9] = [
+const FAILURES: [Option<(FailureKind, u8)>; 11] = [
     None,
     Some((FailureKind::Target, 1)),
     Some((FailureKind::Target, 2)),
     Some((FailureKind::Target, 3)),
+    Some((FailureKind::Target, 4)),
     Some((FailureKind::Target, 255)),
     Some((FailureKind::Execution, 1)),
     Some((FailureKind::Execution, 2)),
     Some((FailureKind::Execution, 3)),
+    Some((FailureKind::Execution, 4)),
     Some((FailureKind::Execution, 255)),
 ];
 
@@ -34,7 +37,7 @@ fn every_question(mut look: impl FnMut(&Switches, &Question)) {
         let switches = switches(bits);
         for &diagnosis in Diagnosis::ALL {
             for failure in FAILURES {
-                for confident in [0, 1, 2, 255] {
+                for confident in [0, 1, 2, 3, 255] {
                     for kappa in KAPPAS {
                         for flags in 0..256_u16 {
                             let flag = |n: u16| flags >> n & 1 == 1;
@@ -245,6 +248,150 @@ fn the_gate_opens_exactly_when_nothing_keeps_it_closed() {
             "{q:?}"
         );
     });
+}
+
+/// Section 6 of the method, rule by rule, for any limits: what the gate says.
+fn restated(limits: &GateParams, on: &Switches, q: &Question) -> Authorisation {
+    use reason::*;
+    let all = |rules: &[(bool, u64)]| {
+        let held = rules.iter().filter(|(holds, _)| *holds);
+        held.fold(0, |bits, (_, bit)| bits | bit)
+    };
+    let target = q.diagnosis == Diagnosis::TargetCorrection;
+    let pick = q.diagnosis == Diagnosis::PickFailure;
+    if !(target || pick || q.diagnosis == Diagnosis::PlaceFailure) {
+        return Authorisation::Closed(0);
+    }
+    let kind = if target {
+        FailureKind::Target
+    } else {
+        FailureKind::Execution
+    };
+    let run = match q.streaks.failure {
+        Some((of, n)) if of == kind => u32::from(n),
+        _ => 0,
+    };
+    let (long, sure) = (
+        run >= limits.failure_streak,
+        u32::from(q.streaks.confident) >= limits.confidence_streak,
+    );
+    let patient = !q.strong;
+    if target && q.initial {
+        Authorisation::Target(INITIAL_GROUNDING)
+    } else if target {
+        match all(&[
+            (!on.target_corrector, SWITCHED_OFF),
+            (!q.rebinds, BUDGET_SPENT),
+            (!q.plan_certain, PLAN_UNCERTAIN),
+            (patient && !long, STREAK_SHORT),
+        ]) {
+            0 => Authorisation::Target(all(&[(long, TARGET_STREAK), (q.strong, STRONG_EVIDENCE)])),
+            shut => Authorisation::Closed(shut),
+        }
+    } else {
+        let hard = match q.routine {
+            Routine::Pick => on.hard_pick,
+            Routine::Place | Routine::Indirect => on.hard_place,
+        };
+        let certain = q.kappa >= limits.confidence;
+        match all(&[
+            (!(on.execution_corrector && hard), SWITCHED_OFF),
+            (q.routine == Routine::Indirect, DESTINATION_INDIRECT),
+            (!q.budget, BUDGET_SPENT),
+            (q.cooling, COOL_DOWN),
+            (!q.plan_certain, PLAN_UNCERTAIN),
+            (!certain, CONFIDENCE_LOW),
+            (patient && !long, STREAK_SHORT),
+            (patient && !sure, CONFIDENCE_STREAK_SHORT),
+            (patient && q.young, ATTEMPT_YOUNG),
+            (
+                patient && q.progress && limits.progress_guard_steps != 0,
+                PROGRESS,
+            ),
+        ]) {
+            0 => Authorisation::Execution(all(&[
+                (long && sure, EXECUTION_STREAK),
+                (q.strong, STRONG_EVIDENCE),
+            ])),
+            shut => Authorisation::Closed(shut),
+        }
+    }
+}
+
+/// Gate and router, every state: each streak from none to one beyond its limit,
+/// each kind of failure, each routine, trust, cool-down, budgets, switches.
+#[test]
+fn gate_and_router_do_what_the_rules_say_for_every_limit() {
+    let mut states = 0_u64;
+    let mut routes = [0_u64; 4];
+    for (limit, trust, guard) in [(1, 1, 8), (2, 3, 0), (3, 2, 8), (4, 1, 0)] {
+        let limits = GateParams {
+            failure_streak: limit,
+            confidence_streak: trust,
+            progress_guard_steps: guard,
+            ..GateParams::default()
+        };
+        let (most, sure) = (limit as u8 + 1, trust as u8 + 1);
+        let of = |kind| (1..=most).map(move |n| Some((kind, n)));
+        let failures = core::iter::once(None)
+            .chain(of(FailureKind::Target))
+            .chain(of(FailureKind::Execution));
+        for failure in failures {
+            for confident in 0..=sure {
+                let streaks = Streaks { failure, confident };
+                every_flag(streaks, |switches, q| {
+                    let found = authorise(&limits, switches, q);
+                    assert_eq!(found, restated(&limits, switches, q), "{limits:?} {q:?}");
+                    for pending in [false, true] {
+                        let expected = match found {
+                            _ if pending => Route::Pending,
+                            Authorisation::Target(_) => Route::Target,
+                            Authorisation::Execution(_) => Route::Execution,
+                            Authorisation::Closed(_) => Route::Base,
+                        };
+                        let route = route(pending, found);
+                        assert_eq!(route, expected, "{q:?}");
+                        routes[usize::from(route.code())] += 1;
+                        states += 1;
+                    }
+                });
+            }
+        }
+    }
+    assert_eq!(
+        states,
+        2 * (5 * 3 + 7 * 5 + 9 * 4 + 11 * 3) * 16 * 6 * 3 * 256 * 3
+    );
+    assert!(routes.iter().all(|n| *n > 10_000), "{routes:?}");
+}
+
+/// Everything that a question may hold besides its streaks.
+fn every_flag(streaks: Streaks, mut look: impl FnMut(&Switches, &Question)) {
+    for (bits, &diagnosis) in (0..SWITCHES).flat_map(|b| Diagnosis::ALL.iter().map(move |d| (b, d)))
+    {
+        for kappa in [f64::NAN, 0.119_999, 0.12] {
+            for (flags, routine) in (0..256_u16).flat_map(|f| ROUTINES.map(|r| (f, r))) {
+                let flag = |n: u16| flags >> n & 1 == 1;
+                look(
+                    &switches(bits),
+                    &Question {
+                        diagnosis,
+                        strong: flag(0),
+                        initial: flag(1),
+                        streaks,
+                        kappa,
+                        young: flag(2),
+                        progress: flag(3),
+                        cooling: flag(4),
+                        budget: flag(5),
+                        rebinds: flag(6),
+                        plan_certain: flag(7),
+                        routine,
+                    },
+                );
+            }
+        }
+    }
 }
 
 #[test]

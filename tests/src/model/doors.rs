@@ -200,7 +200,7 @@ impl Doors {
             } else {
                 report.confidence
             };
-            self.critic = Some((said, sure.max(0.0).min(1.0)));
+            self.critic = Some((said, sure.clamp(0.0, 1.0)));
         }
     }
 

@@ -321,6 +321,7 @@ impl Task {
     }
 
     /// Judges a query.
+    #[expect(clippy::too_many_arguments, reason = "what a query is judged by")]
     pub(super) fn judge(
         &mut self,
         p: &Params,
