@@ -70,6 +70,8 @@ enum Command {
     Plan(cmd::plan::Args),
     /// Run recorded inputs through the core again and compare the answers.
     Replay(cmd::replay::Args),
+    /// Make tables, plots and a page of evaluation results.
+    Report(cmd::report::Args),
     /// Run the controller in real time.
     Rt(cmd::rt::Args),
     /// Run the simulated robot and its world.
@@ -106,6 +108,7 @@ fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Otg(args) => cmd::otg::run(&args),
         Command::Plan(args) => cmd::plan::run(&args),
         Command::Replay(args) => cmd::replay::run(&args),
+        Command::Report(args) => cmd::report::run(&args),
         Command::Rt(args) => cmd::rt::run(&args),
         Command::Sim(args) => cmd::sim::run(&args),
         Command::Trace(args) => cmd::trace::run(&args),

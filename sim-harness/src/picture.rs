@@ -48,25 +48,37 @@ pub(crate) fn use_embedded_font() {
 /// # Errors
 /// [`SimError::Io`] if the file can't be written.
 pub fn write_png(path: &Path, raster: &Raster) -> Result<(), SimError> {
-    let failed = |e: png::EncodingError| match e {
+    let file = File::create(path).map_err(|e| SimError::io(path, e))?;
+    encode(BufWriter::new(file), raster).map_err(|e| match e {
         png::EncodingError::IoError(e) => SimError::io(path, e),
         other => SimError::Picture {
             what: path.display().to_string(),
             problem: other.to_string(),
         },
-    };
-    let file = File::create(path).map_err(|e| SimError::io(path, e))?;
+    })
+}
+
+/// A picture as PNG in memory.
+///
+/// # Errors
+/// [`SimError::Picture`] if the raster's size contradicts its pixels.
+pub fn png_bytes(raster: &Raster) -> Result<Vec<u8>, SimError> {
+    let mut bytes = Vec::new();
+    encode(&mut bytes, raster).map_err(|e| SimError::Picture {
+        what: "a picture in memory".to_owned(),
+        problem: e.to_string(),
+    })?;
+    Ok(bytes)
+}
+
+fn encode(out: impl std::io::Write, raster: &Raster) -> Result<(), png::EncodingError> {
     let size = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-    let mut encoder = png::Encoder::new(
-        BufWriter::new(file),
-        size(raster.width),
-        size(raster.height),
-    );
+    let mut encoder = png::Encoder::new(out, size(raster.width), size(raster.height));
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
-    let mut writer = encoder.write_header().map_err(failed)?;
-    writer.write_image_data(&raster.rgb).map_err(failed)?;
-    writer.finish().map_err(failed)
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&raster.rgb)?;
+    writer.finish()
 }
 
 /// Puts frames side by side, each with its caption below, at most four in a row.

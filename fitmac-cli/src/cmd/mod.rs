@@ -12,6 +12,7 @@ pub(crate) mod ik;
 pub(crate) mod otg;
 pub(crate) mod plan;
 pub(crate) mod replay;
+pub(crate) mod report;
 pub(crate) mod rt;
 pub(crate) mod sim;
 pub(crate) mod trace;

@@ -1,0 +1,7 @@
+//! Lets the tests of this crate find MuJoCo's library where `cargo xtask setup` put it.
+
+fn main() {
+    let root = std::env::var("CARGO_MANIFEST_DIR").expect("cargo sets CARGO_MANIFEST_DIR");
+    println!("cargo:rustc-link-arg=-Wl,-rpath,{root}/../third_party/mujoco/lib");
+    println!("cargo:rerun-if-changed=build.rs");
+}
