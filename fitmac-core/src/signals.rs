@@ -16,6 +16,9 @@ use crate::{
     wire::{GraspClass, PlaceRelation},
 };
 
+/// Radius of a bowl's foot as a share of its rim's: the ring that an ordinary bowl stands on.
+const FOOT_SHARE: f64 = 0.6;
+
 /// True if a thing with thin walls is within reach of the fingers: then a
 /// nearly closed gripper may still hold something.
 fn thin_at_hand(p: &GripperParams, sample: &StateSample) -> bool {
@@ -102,6 +105,9 @@ pub struct TargetView {
     pub half_extent_m: Vector3,
     /// Half its height as it stands or lies, m.
     pub half_height_m: f64,
+    /// Its centre above its underside, m: a bowl that hangs askew reaches down with its foot, which
+    /// is narrower than its rim.
+    pub depth_m: f64,
     /// How it wants to be grasped.
     pub class: GraspClass,
     /// End effector to grasp point (equation 2), m.
@@ -220,6 +226,7 @@ fn target_view(
         orientation: orientation(object.orientation),
         half_extent_m: object.half_extent_m,
         half_height_m: at.half_height_m,
+        depth_m: depth(object),
         class: at.class,
         distance_m: vector::norm(offset),
         distance_xy_m: vector::norm([offset[0], offset[1], 0.0]),
@@ -299,6 +306,19 @@ pub fn half_height(object: &ObjectSample) -> f64 {
     zx.abs() * hx + zy.abs() * hy + zz.abs() * hz
 }
 
+/// An object's centre above its underside, m.
+fn depth(object: &ObjectSample) -> f64 {
+    let [hx, hy, hz] = object.half_extent_m;
+    let foot = match class(object) {
+        GraspClass::Bowl => FOOT_SHARE,
+        _ => 1.0,
+    };
+    half_height(&ObjectSample {
+        half_extent_m: [foot * hx, foot * hy, hz],
+        ..*object
+    })
+}
+
 fn destination_view(
     sample: &StateSample,
     anchor: &Anchor,
@@ -312,7 +332,7 @@ fn destination_view(
     );
     let position_m = frame.transform_point(anchor.offset_m);
     let [dx, dy, _] = vector::sub(target.position_m, position_m);
-    let clearance_m = target.position_m[2] - target.half_height_m - position_m[2];
+    let clearance_m = target.position_m[2] - target.depth_m - position_m[2];
     Some(DestinationView {
         position_m,
         half_extent_m: anchor.half_extent_m,

@@ -173,6 +173,10 @@ impl Subtask {
         }
         let (phase, steps) = (self.estimator.phase(), self.estimator.steps());
         self.level_bits = self.monitor.step(params, phase, steps, &signals);
+        // What was let go in its region may still roll: time alone doesn't speak against it.
+        if self.estimator.carry() == Carry::Released && in_region(&signals) == Some(true) {
+            self.level_bits &= !evidence::TIME_BASED;
+        }
         self.attempt.step(
             params,
             &signals,
@@ -230,7 +234,13 @@ impl Subtask {
         episode_queries: u32,
     ) -> Assessment {
         let carried = self.tracking.is_carried();
-        let kappa = self.lock.kappa(&params.lock, now_ns, Some(sample), carried);
+        let bound = self.lock.kappa(&params.lock, now_ns, Some(sample), carried);
+        let in_hand = carried && self.estimator.is_lifted();
+        let kappa = if bound > 0.0 && (in_hand || self.recovery.is_placing()) {
+            bound.max(params.lock.agreed)
+        } else {
+            bound
+        };
         let rules =
             self.level_bits | self.attempt.latched() | self.lock.evidence(&params.lock, kappa);
         let critic = verdicts.critic_evidence(&params.evidence);

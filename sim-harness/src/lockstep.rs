@@ -70,7 +70,8 @@ pub struct Lockstep {
     plan: Option<Plan>,
     chunks: Mailbox<ActionChunk>,
     groundings: Mailbox<GroundingRecord>,
-    asked: Option<u64>,
+    question: Option<PolicyQuery>,
+    policy_busy_until_ns: u64,
     epoch_given: u64,
     looked_ns: u64,
     last_command: Option<Command>,
@@ -181,7 +182,8 @@ impl Lockstep {
             plan: Some(plan),
             chunks: Mailbox::new(),
             groundings: Mailbox::new(),
-            asked: None,
+            question: None,
+            policy_busy_until_ns: 0,
             epoch_given: 0,
             looked_ns: 0,
             last_command: None,
@@ -267,8 +269,12 @@ impl Lockstep {
             ..Input::default()
         };
         let output = self.controller.tick(now_ns, &input);
-        if let Some(query) = &output.query {
-            self.ask_policy(now_ns, query);
+        // The policy works on one question at a time, and then on the newest one.
+        self.question = output.query.or(self.question);
+        if now_ns >= self.policy_busy_until_ns
+            && let Some(query) = self.question.take()
+        {
+            self.ask_policy(now_ns, &query);
         }
         if let Some(rebind) = &output.rebind {
             self.ground(
@@ -346,11 +352,6 @@ impl Lockstep {
     }
 
     fn ask_policy(&mut self, now_ns: u64, query: &PolicyQuery) {
-        // A question that is repeated while its answer is on the way is not asked twice.
-        if self.asked == Some(query.query_id) {
-            return;
-        }
-        self.asked = Some(query.query_id);
         let prompt = self
             .agents
             .prompt(query.prompt_id)
@@ -359,6 +360,7 @@ impl Lockstep {
         let seen = Observation::of(&self.sim, &prompt, query.policy_step);
         let answer = self.backbone.infer(&seen);
         let late_ns = (answer.latency_s.max(0.0) * 1e9) as u64;
+        self.policy_busy_until_ns = now_ns + late_ns;
         let mut chunk = ActionChunk {
             sequence: self.chunks.next_sequence(),
             session: SESSION,

@@ -402,3 +402,69 @@ fn a_policy_that_dies_and_comes_back_is_waited_for() {
         assert!(!stopped, "{profile}");
     }
 }
+
+#[test]
+fn what_was_let_go_in_its_place_may_roll_for_long() {
+    let scene = Scene::can_to_basket();
+    let mut session = session(Params::guarded(), &scene, Behaviour::Competent);
+    session.verifier = Verifier::Absent;
+    assert!(session.run(STEPS));
+    let start = session.world.body(CAN).map(|b| b.position_m);
+    let start = start.expect("the scene has a can");
+    // A jolt every 13 policy steps: too often to count as rest, too seldom to count as progress.
+    let jolt = 13 * 50_000_000 / session.tick_ns;
+    for tick in 0..20 * jolt {
+        if tick % jolt == 0
+            && let Some(can) = session.world.body_mut(CAN)
+        {
+            let side = if tick / jolt % 2 == 0 { 0.012 } else { 0.0 };
+            can.position_m[0] = start[0] + side;
+        }
+        session.tick();
+    }
+    assert_eq!(
+        session.controller.state().episode().correction_queries(),
+        0,
+        "{}",
+        decisions(&session)
+    );
+}
+
+#[test]
+fn a_faint_binding_that_the_policy_agrees_with_is_placed() {
+    let scene = Scene::can_to_plate();
+    let faint = |provenance| Answer::Target {
+        id: CAN,
+        kappa: 0.05,
+        provenance,
+    };
+    for (agreed, saved) in [(Params::guarded().lock.agreed, true), (0.0, false)] {
+        let mut params = Params::guarded();
+        params.lock.agreed = agreed;
+        let agent = Agent::new([
+            faint(Provenance::Rules),
+            faint(Provenance::Recheck),
+            faint(Provenance::Recheck),
+        ]);
+        let policy = Policy::new(Behaviour::MissesPlace([0.12, 0.0]));
+        let mut session = Session::new(params, scene.clone(), policy, agent);
+        let done = session.run(STEPS);
+        assert_eq!(done, saved, "agreed {agreed}\n{}", decisions(&session));
+    }
+}
+
+#[test]
+fn what_is_put_on_a_surface_touches_it_before_it_is_let_go() {
+    let height = |params: Params| {
+        let behaviour = Behaviour::MissesPlace([0.12, 0.0]);
+        let end = succeeds("touch", session(params, &Scene::can_to_plate(), behaviour));
+        let opens = |r: &&TraceRecord| r.sub_phase == SubPhase::ReleaseReady.code();
+        let record = end.queries.iter().find(opens);
+        record.expect("it opens").destination_distance_m
+    };
+    let (touching, published) = (height(Params::guarded()), height(Params::paper()));
+    assert!(
+        touching < 0.008 && published > 0.012,
+        "{touching} {published}"
+    );
+}

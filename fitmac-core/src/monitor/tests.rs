@@ -40,6 +40,7 @@ fn signals(seen: &Seen) -> Signals {
         orientation: UnitQuaternion::IDENTITY,
         half_extent_m: [0.0; 3],
         half_height_m: 0.0,
+        depth_m: 0.0,
         class: GraspClass::Can,
         distance_m: (seen.ee - x).abs(),
         distance_xy_m: (seen.ee - x).abs(),

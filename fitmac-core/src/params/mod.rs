@@ -221,6 +221,8 @@ impl Params {
         params.gate.plan_confidence = 0.0;
         params.tracking.gain = 1.0;
         params.recovery.rise_under_way_m = 0.0;
+        params.recovery.touch_queries = 0;
+        params.lock.agreed = 0.0;
         params
     }
 

@@ -224,6 +224,8 @@ stage! {
     Lock "lock" {
         /// tau_kappa: below it the binding is uncertain (equation 7; distinct from the gate's threshold, appendix A.5.2).
         kappa_min: f64 = 0.30 in 0.0..=1.0, "1";
+        /// Least confidence in a binding, if it has any, while its target is lifted in the hand or being placed: policy and agents, who don't know of each other, mean the same thing. 0 turns it off.
+        agreed: f64 = 0.35 in 0.0..=1.0, "1";
         /// A pose older than this gives no confidence. (A camera at 10 Hz that answers after 100 ms and misses two frames is 400 ms behind.)
         pose_lost_ms: u32 = 800 in 10..=10000, "ms";
         /// A jump of the locked pose without contact that is inconsistent.
@@ -314,6 +316,8 @@ stage! {
         release_on_m: f64 = 0.020 in 0.0..=0.2, "m";
         /// Depth of the underside below a container's rim at release.
         release_in_m: f64 = 0.020 in -0.1..=0.2, "m";
+        /// Further queries of lowering onto a surface, until the underside touches it, before the gripper opens: what is let go above it swings and slides. 0 opens at `release_on_m`, as in Table 19.
+        touch_queries: u32 = 5 in 0..=40, "queries";
         /// Queries of standing still while the gripper opens.
         release_hold: u32 = 4 in 1..=100, "queries";
         /// Rise of the end effector after release.

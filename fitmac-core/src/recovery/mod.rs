@@ -202,6 +202,18 @@ impl Recovery {
         self.active.is_some()
     }
 
+    /// True while a place is pending, up to its end.
+    #[must_use]
+    pub const fn is_placing(&self) -> bool {
+        matches!(
+            &self.active,
+            Some(Active {
+                running: Running::Place(_),
+                ..
+            })
+        )
+    }
+
     /// Corrections started in this subtask.
     #[must_use]
     pub const fn activations(&self) -> u32 {

@@ -18,7 +18,7 @@ use crate::{
 const OPEN_QUERIES: u32 = 10;
 /// Most queries of rising after the release.
 const RETREAT_QUERIES: u32 = 8;
-/// Height above a surface that the object is lowered to, if nothing stops it, m.
+/// Height above a surface that the object is lowered to, or below it where the touch is felt for, m.
 const TOUCH_M: f64 = 0.005;
 /// A way on which the arm rises faster than it arrives, m.
 const LONG_WAY_M: f64 = 0.20;
@@ -30,7 +30,10 @@ const SLIP_M: f64 = 0.06;
 enum Step {
     LiftCarry,
     MoveAbove,
-    Lower,
+    /// Lowering; so many queries of it within reach of the surface.
+    Lower {
+        touching: u32,
+    },
     /// The gripper was told to open, once.
     ReleaseReady {
         at_m: Vector3,
@@ -78,7 +81,7 @@ impl Place {
         match self.step {
             Step::LiftCarry => SubPhase::LiftCarry,
             Step::MoveAbove => SubPhase::MoveAbove,
-            Step::Lower => SubPhase::Lower,
+            Step::Lower { .. } => SubPhase::Lower,
             Step::ReleaseReady { .. } => SubPhase::ReleaseReady,
             Step::ReleaseHold { .. } => SubPhase::ReleaseHold,
             Step::Retreat { .. } => SubPhase::Retreat,
@@ -88,7 +91,10 @@ impl Place {
 
     /// True until the gripper was told to open.
     pub(super) const fn is_carrying(&self) -> bool {
-        matches!(self.step, Step::LiftCarry | Step::MoveAbove | Step::Lower)
+        matches!(
+            self.step,
+            Step::LiftCarry | Step::MoveAbove | Step::Lower { .. }
+        )
     }
 
     pub(super) fn step(
@@ -103,7 +109,7 @@ impl Place {
         match self.step {
             Step::LiftCarry => self.lift_carry(scene, target, destination),
             Step::MoveAbove => self.move_above(scene, target, destination),
-            Step::Lower => self.lower(scene, target, destination),
+            Step::Lower { touching } => self.lower(scene, target, destination, touching),
             Step::ReleaseReady { at_m } => self.go(Step::ReleaseHold { queries: 1, at_m }),
             Step::ReleaseHold { queries, at_m } => self.release_hold(scene, queries, at_m),
             Step::Retreat { queries, goal_m } => self.retreat(scene, queries, goal_m),
@@ -166,7 +172,7 @@ impl Place {
         d: &DestinationView,
     ) -> Flow<Outcome> {
         if d.distance_xy_m <= Self::align(scene, d) {
-            return self.go(Step::Lower);
+            return self.go(Step::Lower { touching: 0 });
         }
         let [x, y, _] = aligned(scene, target, d);
         let z = Self::carry_z(scene, target, d);
@@ -178,22 +184,30 @@ impl Place {
         scene: &Scene<'_>,
         target: &TargetView,
         d: &DestinationView,
+        touching: u32,
     ) -> Flow<Outcome> {
         let p = &scene.params.recovery;
         let align = Self::align(scene, d);
         if d.distance_xy_m > 2.0 * align {
             return self.go(Step::MoveAbove);
         }
-        let (low_enough, goal_clearance) = match d.relation {
-            PlaceRelation::On => (p.release_on_m, TOUCH_M),
-            PlaceRelation::In => (-p.release_in_m + TOUCH_M, -p.release_in_m),
+        let (low_enough, goal_clearance, patience) = match d.relation {
+            PlaceRelation::On if p.touch_queries > 0 => (p.release_on_m, -TOUCH_M, p.touch_queries),
+            PlaceRelation::On => (p.release_on_m, TOUCH_M, 0),
+            PlaceRelation::In => (-p.release_in_m + TOUCH_M, -p.release_in_m, 0),
         };
+        let low = d.clearance_m <= low_enough;
+        // Noise may hide the touch: patience ends the wait for it.
+        let touches = touching >= patience || d.clearance_m <= 0.0;
         let landed = scene.is_blocked() && d.clearance_m < p.release_on_m + 0.04;
-        if (d.clearance_m <= low_enough || landed) && d.distance_xy_m <= align {
+        if ((low && touches) || landed) && d.distance_xy_m <= align {
             let at_m = scene.signals.ee_m;
             self.step = Step::ReleaseReady { at_m };
             return Flow::Done(Outcome::Act(Motion::to(at_m, Grip::Open)));
         }
+        self.step = Step::Lower {
+            touching: if low { touching.saturating_add(1) } else { 0 },
+        };
         let [x, y, _] = aligned(scene, target, d);
         let z = scene.signals.ee_m[2] + goal_clearance - d.clearance_m;
         Flow::Done(Outcome::Act(Motion::to([x, y, z], Grip::Close)))

@@ -57,7 +57,10 @@ enum Stage {
     },
     Raise,
     Over,
-    Lower,
+    /// Lowering; so many queries of it low above a surface.
+    Lower {
+        low: u32,
+    },
     Ready {
         at: Point,
     },
@@ -310,7 +313,7 @@ impl Arm {
             Stage::Reopen { .. } => SubPhase::Reopen,
             Stage::Raise => SubPhase::LiftCarry,
             Stage::Over => SubPhase::MoveAbove,
-            Stage::Lower => SubPhase::Lower,
+            Stage::Lower { .. } => SubPhase::Lower,
             Stage::Ready { .. } => SubPhase::ReleaseReady,
             Stage::Release { .. } => SubPhase::ReleaseHold,
             Stage::Retreat { .. } => SubPhase::Retreat,
@@ -318,13 +321,13 @@ impl Arm {
         }
     }
 
-    fn picking(&self) -> bool {
+    pub(super) fn picking(&self) -> bool {
         self.step_name() <= SubPhase::Reopen
     }
 
     /// Placing, and the gripper was not told to open yet.
     fn carrying(&self) -> bool {
-        matches!(self.stage, Stage::Raise | Stage::Over | Stage::Lower)
+        matches!(self.stage, Stage::Raise | Stage::Over | Stage::Lower { .. })
     }
 
     pub(super) fn redescents(&self) -> u32 {
@@ -587,7 +590,10 @@ impl Arm {
             way.map_or(over, |top| over.max(top + p.clearance_m)) + hangs
         };
         let centred = |z: f64| [x + d.at[0] - t.at[0], y + d.at[1] - t.at[1], z];
-        let (align, low, goal) = match d.relation {
+        // Onto a surface it presses on for a while, unless it opens above it.
+        let feels = p.touch_queries > 0 && d.relation == PlaceRelation::On;
+        let (align, low_m, goal) = match d.relation {
+            PlaceRelation::On if feels => (p.align_on_m, p.release_on_m, -0.005),
             PlaceRelation::On => (p.align_on_m, p.release_on_m, 0.005),
             PlaceRelation::In => (p.align_in_m, 0.005 - p.release_in_m, -p.release_in_m),
         };
@@ -601,16 +607,19 @@ impl Arm {
                     Flow::Move(Stage::Raise, [x, y, carry_z()], STILL, CLOSE)
                 }
             }
-            Stage::Over if d.beside <= align => Flow::To(Stage::Lower),
+            Stage::Over if d.beside <= align => Flow::To(Stage::Lower { low: 0 }),
             Stage::Over => Flow::Move(Stage::Over, centred(carry_z()), STILL, CLOSE),
-            Stage::Lower if d.beside > 2.0 * align => Flow::To(Stage::Over),
-            Stage::Lower => {
+            Stage::Lower { .. } if d.beside > 2.0 * align => Flow::To(Stage::Over),
+            Stage::Lower { low } => {
+                let is_low = d.clearance <= low_m;
+                let touches = !feels || low >= p.touch_queries || d.clearance <= 0.0;
                 let landed = blocked && d.clearance < p.release_on_m + 0.04;
-                if (d.clearance <= low || landed) && d.beside <= align {
+                if ((is_low && touches) || landed) && d.beside <= align {
                     Flow::Move(Stage::Ready { at: ee }, ee, STILL, OPEN)
                 } else {
                     let z = z + goal - d.clearance;
-                    Flow::Move(Stage::Lower, centred(z), STILL, CLOSE)
+                    let low = if is_low { low + 1 } else { 0 };
+                    Flow::Move(Stage::Lower { low }, centred(z), STILL, CLOSE)
                 }
             }
             Stage::Ready { at } => Flow::To(Stage::Release { n: 1, at }),

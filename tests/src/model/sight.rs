@@ -24,6 +24,8 @@ pub(super) struct Target {
     pub(super) quaternion: [f64; 4],
     pub(super) half: Point,
     pub(super) half_height: f64,
+    /// Centre above the underside; a bowl stands on a foot of 0.6 of its rim.
+    pub(super) depth: f64,
     pub(super) class: GraspClass,
     pub(super) distance: f64,
     pub(super) beside: f64,
@@ -100,6 +102,15 @@ pub(super) fn class(object: &ObjectSample) -> GraspClass {
         .copied()
         .find(|c| c.code() == object.grasp_class)
         .expect("validated")
+}
+
+fn depth(object: &ObjectSample) -> f64 {
+    let [x, y, z] = object.half_extent_m;
+    let half = match class(object) {
+        GraspClass::Bowl => [0.6 * x, 0.6 * y, z],
+        _ => [x, y, z],
+    };
+    Frame::new(object.orientation).half_height(half)
 }
 
 pub(super) fn half_height(object: &ObjectSample) -> f64 {
@@ -304,6 +315,7 @@ impl Steady {
                 quaternion: object.orientation,
                 half: object.half_extent_m,
                 half_height: half_height(object),
+                depth: depth(object),
                 class: class(object),
                 distance: length(offset),
                 beside: flat(offset),
@@ -318,7 +330,7 @@ impl Steady {
                 origin,
             );
             let [dx, dy, dz] = minus(target.at, at);
-            let clearance = dz - target.half_height;
+            let clearance = dz - target.depth;
             Some(Place {
                 at,
                 half: anchor.half,

@@ -294,7 +294,12 @@ impl Story {
         self.pages[newest].phase = self.phase;
         self.pages[newest].progress = self.progress(p);
         self.pages[newest].at_rest = self.at_rest(p);
-        let level = self.monitor(p);
+        let mut level = self.monitor(p);
+        // What lies in its place may roll on.
+        if carry == Carry::Released && look.in_region() == Some(true) {
+            use evidence as e;
+            level &= !(e::STALL | e::TIMEOUT | e::REVERSAL | e::MOVING_AWAY);
+        }
         let bits = self.attempt(p, verdict);
         self.pages[newest].bits = bits;
         if self.latched() & evidence::DROPPED != 0 && matches!(carry, Carry::Lifted { .. }) {

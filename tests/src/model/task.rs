@@ -259,10 +259,18 @@ impl Task {
         };
         let seen = thing(sample, binding.target)
             .is_some_and(|o| now.saturating_sub(o.stamp_ns) <= ms(p.lock.pose_lost_ms));
-        if seen || self.steady.carried() {
+        let bound = if seen || self.steady.carried() {
             binding.confidence
         } else {
             0.0
+        };
+        // The policy lifted what the agents mean, or we place it.
+        let placing = self.arm.as_ref().is_some_and(|arm| !arm.picking());
+        let agreed = placing || (self.steady.carried() && self.story.is_lifted());
+        if bound > 0.0 && agreed {
+            bound.max(p.lock.agreed)
+        } else {
+            bound
         }
     }
 

@@ -22,6 +22,10 @@ const OPEN_STEPS: u32 = 6;
 const NOT_OPEN_M: f64 = 0.010;
 /// Farther than this from where a stage belongs, the stage is not believed, m.
 const LOST_M: f64 = 0.06;
+/// Farther off than this to the side, the descent waits, m.
+const FUNNEL_M: f64 = 0.010;
+/// Height above the grasp at which it waits: above what is grasped by its sides, m.
+const FUNNEL_HEIGHT_M: f64 = 0.070;
 /// Amplitude of the tremor of a policy that has come to its end, m.
 const DITHER_M: f64 = 0.005;
 
@@ -81,7 +85,8 @@ impl Stage {
         let here = mass.position_m;
         let (waypoint, gripper) = match self {
             Self::Approach => (w.hover, -1.0),
-            Self::Descend | Self::Settle { .. } => (w.grasp, -1.0),
+            Self::Descend => (w.funnelled(here), -1.0),
+            Self::Settle { .. } => (w.grasp, -1.0),
             Self::Close { .. } => (w.grasp, 1.0),
             // Straight up from wherever the grasp was.
             Self::Lift => (Vector3::new(here.x, here.y, w.carry.z), 1.0),
@@ -155,6 +160,19 @@ impl Stage {
 }
 
 impl Waypoints {
+    /// The grasp, or the point above it from which the tool goes down once it is lined up; a tool
+    /// that is lower already is not raised.
+    fn funnelled(&self, here: Vector3<f64>) -> Vector3<f64> {
+        let off_m = (here - self.grasp).xy().norm();
+        let wait_z = (self.grasp.z + FUNNEL_HEIGHT_M).min(here.z);
+        let z = if off_m > FUNNEL_M {
+            wait_z.max(self.grasp.z)
+        } else {
+            self.grasp.z
+        };
+        Vector3::new(self.grasp.x, self.grasp.y, z)
+    }
+
     /// Half of the way that the object is carried, m.
     fn halfway(&self) -> f64 {
         0.5 * (self.carry - self.grasp).xy().norm()
