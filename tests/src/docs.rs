@@ -23,11 +23,19 @@ pub struct Page {
 }
 
 /// All pages.
-pub const PAGES: &[Page] = &[Page {
-    name: "state-machine",
-    path: "docs/state-machine.md",
-    make: state_machine,
-}];
+pub const PAGES: &[Page] = &[
+    Page {
+        name: "state-machine",
+        path: "docs/state-machine.md",
+        make: state_machine,
+    },
+    #[cfg(feature = "programs")]
+    Page {
+        name: "faults",
+        path: crate::faults::PAGE,
+        make: crate::faults::page,
+    },
+];
 
 const MADE: &str = "<!-- Made by `cargo xtask docs`: do not edit. -->\n";
 

@@ -18,6 +18,7 @@ use tempfile::TempDir;
 const GIVE_UP: Duration = Duration::from_secs(120);
 
 /// Builds `fitmac` in the profile of the running test, once, and says where it is.
+/// `FITMAC_PROGRAM` names an installed one to test instead.
 ///
 /// # Panics
 /// If it does not build: its compiler messages are above then.
@@ -25,6 +26,9 @@ const GIVE_UP: Duration = Duration::from_secs(120);
 pub fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
+        if let Some(installed) = std::env::var_os("FITMAC_PROGRAM") {
+            return installed.into();
+        }
         // target/PROFILE/deps/TEST-HASH
         let test = std::env::current_exe().expect("the path of the test");
         let folder = test.ancestors().nth(2).expect("the profile's folder");
@@ -48,13 +52,11 @@ pub fn program() -> &'static Path {
     })
 }
 
-/// A place where `fitmac` runs alone: instances and outputs are its own, and no
-/// other test of the same program has one at the same time, as real time on a
-/// small machine cannot be shared.
+/// A place where `fitmac` runs: instances and outputs are its own.
 #[derive(Debug)]
 pub struct Place {
     folder: TempDir,
-    _alone: MutexGuard<'static, ()>,
+    _alone: Option<MutexGuard<'static, ()>>,
 }
 
 static ALONE: Mutex<()> = Mutex::new(());
@@ -66,7 +68,8 @@ impl Default for Place {
 }
 
 impl Place {
-    /// An empty place.
+    /// An empty place. No other test of the same program has one of these at
+    /// the same time, as a small machine cannot run several demos in real time.
     ///
     /// # Panics
     /// If there is no temporary folder.
@@ -75,8 +78,21 @@ impl Place {
         // A test that failed has spoilt nothing for the next one.
         let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         Self {
+            _alone: Some(alone),
+            ..Self::beside_others()
+        }
+    }
+
+    /// An empty place beside those of other tests, for what needs little of
+    /// the machine.
+    ///
+    /// # Panics
+    /// If there is no temporary folder.
+    #[must_use]
+    pub fn beside_others() -> Self {
+        Self {
             folder: tempfile::tempdir().expect("a temporary folder"),
-            _alone: alone,
+            _alone: None,
         }
     }
 
@@ -92,7 +108,24 @@ impl Place {
     /// If it does not start.
     #[must_use]
     pub fn start(&self, arguments: &[&str]) -> Run {
-        let mut command = Command::new(program());
+        self.start_under(&[], arguments)
+    }
+
+    /// Starts `fitmac` under a program that changes something for it, like
+    /// `["setpriv", "--no-new-privs"]`.
+    ///
+    /// # Panics
+    /// If it does not start.
+    #[must_use]
+    pub fn start_under(&self, wrapper: &[&str], arguments: &[&str]) -> Run {
+        let mut command = match wrapper.split_first() {
+            None => Command::new(program()),
+            Some((outer, its)) => {
+                let mut command = Command::new(outer);
+                command.args(its).arg(program());
+                command
+            }
+        };
         command.args(arguments).current_dir(self.folder());
         command.env("XDG_RUNTIME_DIR", self.folder());
         command

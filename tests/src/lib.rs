@@ -1,7 +1,11 @@
 //! What crosses crates.
 
 pub mod bytes;
+#[cfg(feature = "programs")]
+pub mod cell;
 pub mod docs;
+#[cfg(feature = "programs")]
+pub mod faults;
 #[cfg(feature = "programs")]
 pub mod fitmac;
 pub mod invariants;

@@ -72,6 +72,8 @@ enum Command {
     Fuzz(cmd::fuzz::Args),
     /// Compare the core with a second one, tick by tick (10 million ticks: two minutes).
     Soak(cmd::soak::Args),
+    /// Measure the reaction to every fault against real processes (2 minutes).
+    Faults(cmd::faults::Args),
     /// Say what the machine lacks to build and test.
     Doctor(cmd::doctor::Args),
 }
@@ -91,6 +93,7 @@ fn main() -> ExitCode {
         Command::Stack(args) => cmd::stack::run(&workspace, &args),
         Command::Install(args) => cmd::install::run(&workspace, &args),
         Command::Docs(args) => cmd::docs::run(&workspace, &args),
+        Command::Faults(args) => cmd::faults::run(&workspace, &args),
         Command::Swarm(args) => cmd::swarm::run(&workspace, &args),
         Command::Fuzz(args) => cmd::fuzz::run(&workspace, &args),
         Command::Soak(args) => cmd::soak::run(&workspace, &args),

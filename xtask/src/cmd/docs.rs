@@ -24,6 +24,10 @@ const DOCUMENTS: &[(&str, &[&str])] = &[
             "state-machine",
         ],
     ),
+    (
+        "docs/faults.md",
+        &["--package=fitmac-tests", "--example=page", "--", "faults"],
+    ),
 ];
 
 /// Arguments of `docs`.
