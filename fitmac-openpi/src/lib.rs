@@ -4,7 +4,7 @@
 //! The protocol, read off openpi's `websocket_policy_server.py` and `msgpack_numpy.py`: after the
 //! websocket handshake the server sends one msgpack map, its metadata. Then each binary frame with
 //! an observation is answered by one binary frame with actions. A text frame is the traceback of
-//! a failure, after which the server closes. Arrays are maps with binary keys ([`array`]).
+//! a failure, after which the server closes. Arrays are maps with binary keys ([`mod@array`]).
 //!
 //! An answer carries no number of its question. So there is one question at a time, and a
 //! connection whose answer did not come in time is dropped: the late answer must not be taken for

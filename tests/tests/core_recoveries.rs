@@ -417,7 +417,11 @@ fn what_was_let_go_in_its_place_may_roll_for_long() {
         if tick % jolt == 0
             && let Some(can) = session.world.body_mut(CAN)
         {
-            let side = if tick / jolt % 2 == 0 { 0.012 } else { 0.0 };
+            let side = if (tick / jolt).is_multiple_of(2) {
+                0.012
+            } else {
+                0.0
+            };
             can.position_m[0] = start[0] + side;
         }
         session.tick();

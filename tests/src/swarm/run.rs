@@ -53,7 +53,7 @@ pub struct Summary {
     /// Requests to ground anew.
     pub rebinds: u64,
     /// Longest time from the end of the faults to the end of
-    /// [`STEPS_ALIVE`] steps, ns.
+    /// `STEPS_ALIVE` steps, ns.
     pub alive_after_ns: u64,
     /// A hash of every command: equal runs have equal ones.
     pub fingerprint: u64,
