@@ -14,10 +14,13 @@ mod timeline;
 
 use std::process::ExitCode;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow};
 use clap::{Parser, Subcommand};
 use exit::Exit;
-use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
+use rustix::{
+    event::{PollFd, PollFlags, poll},
+    process::{Pid, PidfdFlags, Signal, getpid, getppid, kill_process, pidfd_open},
+};
 
 /// Runtime assurance for robots that run a vision-language-action policy.
 #[derive(Parser)]
@@ -116,13 +119,23 @@ fn run(cli: Cli) -> anyhow::Result<Exit> {
     }
 }
 
-/// Has the system ask us to end when our supervisor dies.
+/// Ends this process, in order, when its supervisor has ended.
+///
+/// Linux has a signal for that, but it comes once for each thread that the
+/// supervisor had, and our second signal means to end at once.
 fn end_with(supervisor: i32) -> anyhow::Result<()> {
-    set_parent_process_death_signal(Some(Signal::TERM)).context("following the supervisor")?;
-    // It may have died before we said so.
-    let parent = getppid().map(Pid::as_raw_nonzero).map(i32::from);
-    if parent != Some(supervisor) {
-        bail!("the supervisor (pid {supervisor}) has ended");
+    let gone = || anyhow!("the supervisor (pid {supervisor}) has ended");
+    let pid = Pid::from_raw(supervisor).with_context(gone)?;
+    let handle = pidfd_open(pid, PidfdFlags::empty()).with_context(gone)?;
+    // It may have ended, and its number be given to another, before that.
+    if getppid() != Some(pid) {
+        return Err(gone());
     }
+    std::thread::spawn(move || {
+        let mut ends = [PollFd::new(&handle, PollFlags::IN)];
+        while poll(&mut ends, None).is_err() {} // interrupted by a signal
+        // Cannot fail: it goes to ourselves.
+        let _ = kill_process(getpid(), Signal::TERM);
+    });
     Ok(())
 }
