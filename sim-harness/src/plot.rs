@@ -99,7 +99,7 @@ fn lines(area: &Area<'_>, title: &str, samples: &[Sample], span: std::ops::Range
         .margin(8)
         .x_label_area_size(28)
         .y_label_area_size(58)
-        .build_cartesian_2d(span, 0.0..1.05 * highest)?;
+        .build_cartesian_2d(span, 0.0..1.3 * highest)?; // room for the legend
     chart
         .configure_mesh()
         .x_desc("time, s")
@@ -131,6 +131,7 @@ fn lines(area: &Area<'_>, title: &str, samples: &[Sample], span: std::ops::Range
     }
     chart
         .configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
         .background_style(WHITE.mix(0.85))
         .border_style(RGBColor(200, 200, 200))
         .label_font(("sans-serif", 12))

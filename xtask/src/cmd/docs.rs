@@ -36,7 +36,16 @@ pub(crate) struct Args {
     /// Write nothing; fail if a document is not what the code prints.
     #[arg(long)]
     pub(super) check: bool,
+    /// Also draw the README's pictures anew: runs the demo (two minutes).
+    #[arg(long, conflicts_with = "check")]
+    pub(super) pictures: bool,
 }
+
+/// The README's pictures, and the files of the demo that they are copies of.
+const PICTURES: &[(&str, &str)] = &[
+    ("docs/pictures/demo-strip.png", "fit-mac/strip.png"),
+    ("docs/pictures/demo-plot.png", "fit-mac/plot.png"),
+];
 
 /// Writes every document, or checks it.
 pub(crate) fn run(workspace: &Workspace, args: &Args) -> anyhow::Result<()> {
@@ -63,6 +72,34 @@ pub(crate) fn run(workspace: &Workspace, args: &Args) -> anyhow::Result<()> {
             "{} is not what the code prints: run `cargo xtask docs`",
             stale.join(", ")
         );
+    }
+    if args.pictures {
+        draw(workspace)?;
+    }
+    Ok(())
+}
+
+fn draw(workspace: &Workspace) -> anyhow::Result<()> {
+    process::step("Running the demo for its pictures");
+    let out = workspace.root().join("out/pictures");
+    let mut demo = process::cargo(workspace);
+    demo.args([
+        "run",
+        "--release",
+        "--quiet",
+        "--locked",
+        "--package=fitmac-cli",
+        "--",
+    ])
+    .args(["demo", "--seed", "3", "--out"])
+    .arg(&out);
+    process::run(&mut demo)?;
+    for (picture, drawn) in PICTURES {
+        let file = workspace.root().join(picture);
+        fs::create_dir_all(file.parent().unwrap_or(workspace.root()))
+            .and_then(|()| fs::copy(out.join(drawn), &file))
+            .map_err(|error| not_writable(&file, &error))?;
+        process::step(&format!("Drew {picture}"));
     }
     Ok(())
 }
