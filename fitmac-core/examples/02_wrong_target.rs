@@ -8,7 +8,9 @@
 //! `cargo run -p fitmac-core --example 02_wrong_target`
 
 use fitmac_core::{Params, wire::Provenance};
-use fitmac_tests::world::{Agent, Answer, Behaviour, CAN, OTHER, Policy, Scene, Session, table};
+use fitmac_core_tests::world::{
+    Agent, Answer, Behaviour, CAN, OTHER, Policy, Scene, Session, table,
+};
 
 fn main() {
     let agent = Agent::new([

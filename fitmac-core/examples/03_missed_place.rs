@@ -8,7 +8,7 @@
 //! `cargo run -p fitmac-core --example 03_missed_place`
 
 use fitmac_core::Params;
-use fitmac_tests::world::{Agent, Behaviour, Policy, Scene, Session, table};
+use fitmac_core_tests::world::{Agent, Behaviour, Policy, Scene, Session, table};
 
 fn main() {
     let scene = Scene::can_to_plate();

@@ -7,7 +7,7 @@
 //! `cargo run -p fitmac-core --example 04_closed_gate`
 
 use fitmac_core::{Params, message::Plan, wire::Route};
-use fitmac_tests::world::{Agent, Behaviour, Policy, Scene, Session, table};
+use fitmac_core_tests::world::{Agent, Behaviour, Policy, Scene, Session, table};
 
 fn main() {
     let scene = Scene::can_to_plate();

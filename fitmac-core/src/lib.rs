@@ -12,7 +12,7 @@
 //!
 //! ```
 //! use fitmac_core::{Params, wire::Route};
-//! use fitmac_tests::world::{Agent, Behaviour, Policy, Scene, Session, table};
+//! use fitmac_core_tests::world::{Agent, Behaviour, Policy, Scene, Session, table};
 //!
 //! let scene = Scene::can_to_plate();
 //! let agent = Agent::knowing(&scene);

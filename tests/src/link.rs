@@ -14,10 +14,9 @@ use fitmac_core::{
     wire::{Provenance, Route},
 };
 
-use crate::{
-    oracle::{python, workspace_root},
-    world::{Agent, Answer, Behaviour, OTHER, Policy, Scene, Session},
-};
+use fitmac_core_tests::world::{Agent, Answer, Behaviour, OTHER, Policy, Scene, Session};
+
+use crate::oracle::{python, workspace_root};
 
 /// The inputs of an episode and the core's answers, as bytes.
 #[derive(Clone, Debug, Default)]

@@ -1,16 +1,10 @@
 //! Runs the Python oracles.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-/// The root of the workspace.
-#[must_use]
-pub fn workspace_root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .map_or_else(PathBuf::new, Path::to_path_buf)
-}
+pub use fitmac_core_tests::workspace_root;
 
 /// The Python of the virtual environment that holds the oracles.
 ///

@@ -3,7 +3,7 @@
 mod meter;
 
 use fitmac_core::Controller;
-use fitmac_tests::swarm::Swarm;
+use fitmac_core_tests::swarm::Swarm;
 use meter::calls;
 
 #[test]

@@ -3,7 +3,7 @@
 
 use std::process::Command;
 
-use fitmac_tests::replay::fingerprint;
+use fitmac_core_tests::replay::fingerprint;
 
 const SEEDS: u64 = 8;
 

@@ -13,6 +13,7 @@ use fitmac_core::{
         ActionChunk, CriticReport, GroundingRecord, Input, Plan, StateSample, VerifierReport,
     },
 };
+use fitmac_core_tests::world::{Agent, Behaviour, Policy, Scene, Session};
 use fitmac_rt::{
     config,
     frame::{Parts, Tick, TickHead},
@@ -22,7 +23,6 @@ use fitmac_rt::{
 use fitmac_tests::{
     link::{assert_same_bytes, blocks, recordings, run, tool},
     oracle::{python, workspace_root},
-    world::{Agent, Behaviour, Policy, Scene, Session},
 };
 
 /// Two episodes as `fitmac eval` writes them, shortened.

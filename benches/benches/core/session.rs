@@ -6,7 +6,7 @@ use fitmac_core::{
     Controller, Params,
     message::{ActionChunk, GroundingRecord, Input, StateSample, VerifierReport},
 };
-use fitmac_tests::world::{Agent, Behaviour, Policy, Scene, Session, Verifier};
+use fitmac_core_tests::world::{Agent, Behaviour, Policy, Scene, Session, Verifier};
 
 /// A control tick of 1 kHz, and as many as the session has.
 const TICK_NS: u64 = 1_000_000;

@@ -5,7 +5,7 @@ use fitmac_core::{
     message::{Input, Output},
     wire::EventKind,
 };
-use fitmac_tests::{
+use fitmac_core_tests::{
     swarm::Swarm,
     world::{Agent, Behaviour, OTHER, Policy, Scene, Session, Verifier},
 };

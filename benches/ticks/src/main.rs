@@ -13,7 +13,7 @@ mod stack;
 
 use std::process::ExitCode;
 
-use fitmac_tests::replay;
+use fitmac_core_tests::replay;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

@@ -7,7 +7,7 @@ use fitmac_core::{
     Controller,
     message::{Input, Output},
 };
-use fitmac_tests::swarm::Swarm;
+use fitmac_core_tests::swarm::Swarm;
 
 const PAINTED: usize = 64 * 1024;
 const PAINT: u8 = 0xa5;

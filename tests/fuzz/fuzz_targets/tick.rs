@@ -1,7 +1,7 @@
 //! Bytes become time steps and messages of a controller; every tick is checked.
 #![no_main]
 
-use fitmac_tests::bytes;
+use fitmac_core_tests::bytes;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|input: &[u8]| {

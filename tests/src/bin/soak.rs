@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use fitmac_tests::soak::{self, Disagreement, Seen};
+use fitmac_core_tests::soak::{self, Disagreement, Seen};
 
 /// Time between two lines of progress.
 const PROGRESS_EVERY: Duration = Duration::from_secs(10);

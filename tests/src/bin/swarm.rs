@@ -6,7 +6,7 @@ use std::{
 };
 
 use clap::Parser;
-use fitmac_tests::swarm::{Failure, Summary, sweep};
+use fitmac_core_tests::swarm::{Failure, Summary, sweep};
 
 /// Time between two lines of progress.
 const PROGRESS_EVERY: Duration = Duration::from_secs(10);

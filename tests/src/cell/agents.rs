@@ -6,7 +6,7 @@ use fitmac_core::message::{GroundingRecord, Plan};
 use fitmac_rt::{clock, endpoint::AgentsEndpoint, port::Session, transport::Ipc};
 
 use super::{PAUSE, thread::Shared};
-use crate::world::{Agent, Answer, Scene};
+use fitmac_core_tests::world::{Agent, Answer, Scene};
 
 /// Agents.
 pub struct AgentsState {

@@ -6,7 +6,7 @@ use fitmac_core::message::ActionChunk;
 use fitmac_rt::{clock, endpoint::PolicyEndpoint, port::Session, transport::Ipc};
 
 use super::{PAUSE, robot::Spoil, thread::Shared};
-use crate::world::{Behaviour, Policy, Scene};
+use fitmac_core_tests::world::{Behaviour, Policy, Scene};
 
 /// A policy.
 pub struct PolicyState {

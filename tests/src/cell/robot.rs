@@ -11,7 +11,7 @@ use fitmac_rt::{
 };
 
 use super::thread::Shared;
-use crate::world::{Scene, World};
+use fitmac_core_tests::world::{Scene, World};
 
 /// Time between two of its ticks; by so much the world goes on in each.
 const TICK: Duration = Duration::from_millis(1);

@@ -5,10 +5,8 @@ use fitmac_core::{
     reason,
     wire::{Mode, SubPhase},
 };
-use fitmac_tests::{
-    cell::{AgentsState, Cell, Heard, PolicyState, RobotState},
-    world::{CAN, OTHER, PLATE},
-};
+use fitmac_core_tests::world::{CAN, OTHER, PLATE};
+use fitmac_tests::cell::{AgentsState, Cell, Heard, PolicyState, RobotState};
 
 use crate::{STOP_MAX_M, assert_sound, holds, moving, note, now_ns, stop_distance_m, stops};
 

@@ -3,11 +3,9 @@
 use std::{fs, process::Command as Process, time::Duration};
 
 use fitmac_core::{Controller, Params, message::Input, reason, wire::Mode};
+use fitmac_core_tests::world::Scene;
 use fitmac_rt::{endpoint::StopCause, layout::Payload};
-use fitmac_tests::{
-    cell::{AgentsState, Cell, Heard, PolicyState, RobotState, signal},
-    world::Scene,
-};
+use fitmac_tests::cell::{AgentsState, Cell, Heard, PolicyState, RobotState, signal};
 use rustix::process::Signal;
 
 use crate::{STOP_MAX_M, assert_sound, moving, note, note_time, now_ns, stop_distance_m, stops};

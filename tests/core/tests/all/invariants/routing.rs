@@ -8,9 +8,9 @@ use fitmac_core::{
     route::route,
     wire::{Mode, Route, SubPhase},
 };
-use fitmac_tests::world::{Agent, Behaviour, Policy, Scene};
+use fitmac_core_tests::world::{Agent, Behaviour, Policy, Scene};
 
-use crate::stand::{failures, session, swarms};
+use super::stand::{failures, session, swarms};
 
 const AUTHORISATIONS: [Authorisation; 5] = [
     Authorisation::Closed(0),

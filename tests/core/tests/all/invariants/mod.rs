@@ -1,5 +1,5 @@
 //! The invariants of the core, by number. What each says, and where those that
-//! are not here are tested, stands in `fitmac_tests::invariants`; [`index`]
+//! are not here are tested, stands in `fitmac_core_tests::invariants`; [`index`]
 //! fails if a number has no test.
 
 mod budget;

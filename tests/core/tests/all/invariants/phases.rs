@@ -15,9 +15,9 @@ use fitmac_core::{
         UnknownCode, Verdict,
     },
 };
-use fitmac_tests::world::{Behaviour, Scene, Session};
+use fitmac_core_tests::world::{Behaviour, Scene, Session};
 
-use crate::stand::{failures, run_to_correction, session, swarms};
+use super::stand::{failures, run_to_correction, session, swarms};
 
 #[test]
 fn inv_43_the_phase_changes_along_declared_edges_only() {

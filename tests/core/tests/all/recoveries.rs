@@ -7,7 +7,7 @@ use fitmac_core::{
     params::Switches,
     wire::{DestinationKind, Diagnosis, Mode, Provenance, Route, SubPhase},
 };
-use fitmac_tests::world::{
+use fitmac_core_tests::world::{
     Agent, Answer, BASKET, Behaviour, CAN, OTHER, PLATE, Policy, Scene, Session, Verifier, table,
 };
 use kinematics::rotation::UnitQuaternion;

@@ -6,12 +6,12 @@ use fitmac_core::{
     message::CriticReport,
     wire::{CriticLabel, Provenance, Route},
 };
-use fitmac_tests::{
+use fitmac_core_tests::{
     swarm::Swarm,
     world::{Agent, Answer, Behaviour, Scene},
 };
 
-use crate::stand::{SEEDS, failures, session, swarms};
+use super::stand::{SEEDS, failures, session, swarms};
 
 #[test]
 fn inv_23_a_streak_grows_by_one_a_query_of_the_same_kind() {

@@ -3,9 +3,9 @@
 
 use std::fs;
 
-use fitmac_tests::{
+use fitmac_core_tests::{
     bytes::{self, Run},
-    oracle::workspace_root,
+    workspace_root,
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

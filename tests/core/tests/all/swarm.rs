@@ -6,7 +6,7 @@ use fitmac_core::{
     message::{Input, Output},
     wire::Mode,
 };
-use fitmac_tests::swarm::{Controls, Failure, Run, sweep};
+use fitmac_core_tests::swarm::{Controls, Failure, Run, sweep};
 
 #[test]
 fn a_million_ticks_of_faults_break_no_invariant() {

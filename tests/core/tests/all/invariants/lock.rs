@@ -7,11 +7,13 @@ use fitmac_core::{
     message::{Candidate, GroundingRecord, Input, StateSample},
     wire::{EventKind, Route},
 };
-use fitmac_tests::world::{Agent, Answer, Behaviour, CAN, OTHER, Policy, Scene, Session, Verifier};
+use fitmac_core_tests::world::{
+    Agent, Answer, Behaviour, CAN, OTHER, Policy, Scene, Session, Verifier,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::stand::{session, swarms};
+use super::stand::{session, swarms};
 
 #[test]
 fn inv_51_the_lock_moves_only_in_a_target_query_or_with_the_subtask() {

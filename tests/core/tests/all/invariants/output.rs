@@ -8,11 +8,11 @@ use fitmac_core::{
     recovery::waypoint::recovery_translation,
     wire::{Mode, Route, SubPhase},
 };
-use fitmac_tests::world::{Agent, Behaviour, Policy, Scene};
+use fitmac_core_tests::world::{Agent, Behaviour, Policy, Scene};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::stand::{bits, failures, run_to_correction, session, swarms};
+use super::stand::{bits, failures, run_to_correction, session, swarms};
 
 fn all_finite(c: &Command) -> bool {
     c.action

@@ -15,7 +15,7 @@ use fitmac_core::{
     message::TraceRecord,
     wire::{Diagnosis as D, GraspClass, Phase as P, PlaceRelation, Route as R, SubPhase as S},
 };
-use fitmac_tests::world::{
+use fitmac_core_tests::world::{
     Agent, BOWL, Behaviour, Body, OTHER, PLATE, Plant, Policy, Scene, Session, Support, World,
     table,
 };

@@ -2,9 +2,9 @@
 
 use std::{collections::BTreeSet, fs};
 
-use fitmac_tests::{
+use fitmac_core_tests::{
     invariants::{INVARIANTS, Invariant},
-    oracle::workspace_root,
+    workspace_root,
 };
 
 /// The invariants that the test functions of a file name: `inv_17_...`,

@@ -2,7 +2,7 @@
 //! xtask soak` runs it for longer.
 
 use fitmac_core::{message::Output, reason, wire::Route};
-use fitmac_tests::soak::{Disagreement, Seen, TICKS, run, run_spoilt};
+use fitmac_core_tests::soak::{Disagreement, Seen, TICKS, run, run_spoilt};
 
 /// What so few ticks need not reach, or what the core itself never says.
 const RARE: [&str; 8] = [

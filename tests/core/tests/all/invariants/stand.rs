@@ -1,8 +1,8 @@
 //! What the tests share: sessions and swarms that are watched tick by tick.
 
 use fitmac_core::{Controller, Params, message::Action};
-pub(crate) use fitmac_tests::swarm::{Glimpse, Seen};
-use fitmac_tests::{
+pub(crate) use fitmac_core_tests::swarm::{Glimpse, Seen};
+use fitmac_core_tests::{
     swarm::Swarm,
     world::{Agent, Behaviour, OTHER, Policy, Scene, Session},
 };

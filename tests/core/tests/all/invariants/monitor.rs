@@ -7,12 +7,12 @@ use fitmac_core::{
     message::TraceRecord,
     params::Switches,
 };
-use fitmac_tests::{
+use fitmac_core_tests::{
     swarm::Swarm,
     world::{Behaviour, Scene, Session},
 };
 
-use crate::stand::{failures, session};
+use super::stand::{failures, session};
 
 /// What was decided, without places and times.
 fn decided(run: &Session) -> Vec<(u64, u64, u8, u8, u8, u8)> {

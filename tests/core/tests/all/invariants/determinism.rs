@@ -9,9 +9,9 @@ use fitmac_core::{
     params::ParamInfo,
     wire::{Mode, Route},
 };
-use fitmac_tests::swarm::{Swarm, Told};
+use fitmac_core_tests::swarm::{Swarm, Told};
 
-use crate::stand::{SEEDS, swarms};
+use super::stand::{SEEDS, swarms};
 
 #[test]
 fn inv_62_the_same_inputs_give_the_same_outputs_and_state() {
@@ -237,7 +237,7 @@ fn inv_70_who_reads_the_trace_changes_nothing() {
             let told = swarm.tick();
             let output = read.tick(told.now_ns, &told.input());
             if let Some(record) = &output.trace {
-                lines += fitmac_tests::world::table::row(record).len();
+                lines += fitmac_core_tests::world::table::row(record).len();
             }
             let command = dropped.tick(told.now_ns, &told.input()).command;
             assert_eq!(bytes(&command), bytes(&output.command));

@@ -6,9 +6,9 @@ use fitmac_core::{
     reason,
     wire::{Route, SubPhase},
 };
-use fitmac_tests::world::{Behaviour, Scene, Session};
+use fitmac_core_tests::world::{Behaviour, Scene, Session};
 
-use crate::stand::{failures, run_to_correction, session, swarms};
+use super::stand::{failures, run_to_correction, session, swarms};
 
 #[test]
 fn inv_57_each_query_costs_one_and_nothing_gives_it_back() {

@@ -1,8 +1,8 @@
 //! The invariants of the core: what each says, and which tests show it.
 //!
-//! A test names its number; `tests/tests/core_invariants/index.rs` fails if a
+//! A test names its number; `tests/core/tests/all/invariants/index.rs` fails if a
 //! number is missing, if a test that is named here does not exist, or if one
-//! that exists is not named. `docs/invariants.md` is made from this table.
+//! that exists is not named.
 
 /// One invariant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,14 +55,14 @@ impl Section {
     }
 }
 
-const LOOP_OUTPUT: &str = "tests/tests/core_invariants/output.rs";
-const LOOP_ROUTING: &str = "tests/tests/core_invariants/routing.rs";
-const LOOP_GATE: &str = "tests/tests/core_invariants/gate.rs";
-const LOOP_MONITOR: &str = "tests/tests/core_invariants/monitor.rs";
-const LOOP_PHASES: &str = "tests/tests/core_invariants/phases.rs";
-const LOOP_LOCK: &str = "tests/tests/core_invariants/lock.rs";
-const LOOP_BUDGET: &str = "tests/tests/core_invariants/budget.rs";
-const LOOP_DETERMINISM: &str = "tests/tests/core_invariants/determinism.rs";
+const LOOP_OUTPUT: &str = "tests/core/tests/all/invariants/output.rs";
+const LOOP_ROUTING: &str = "tests/core/tests/all/invariants/routing.rs";
+const LOOP_GATE: &str = "tests/core/tests/all/invariants/gate.rs";
+const LOOP_MONITOR: &str = "tests/core/tests/all/invariants/monitor.rs";
+const LOOP_PHASES: &str = "tests/core/tests/all/invariants/phases.rs";
+const LOOP_LOCK: &str = "tests/core/tests/all/invariants/lock.rs";
+const LOOP_BUDGET: &str = "tests/core/tests/all/invariants/budget.rs";
+const LOOP_DETERMINISM: &str = "tests/core/tests/all/invariants/determinism.rs";
 const CORE_GATE: &str = "fitmac-core/src/gate/tests.rs";
 const CORE_DIAGNOSIS: &str = "fitmac-core/src/diagnosis/tests.rs";
 const CORE_MONITOR: &str = "fitmac-core/src/monitor/tests.rs";
