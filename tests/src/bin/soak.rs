@@ -23,13 +23,15 @@ fn main() -> ExitCode {
         Ok(sum) => {
             println!(
                 "seeds {seed} to {}: core and model agree on {} ticks ({} values compared, \
-                 {} queries, {} of them corrections, {} rebind requests)",
+                 {} queries, {} of them corrections, {} rebind requests); \
+                 {} of {runs} runs were cut short by a tie",
                 seed + runs - 1,
                 sum.ticks,
                 sum.values,
                 sum.queries,
                 sum.corrections,
-                sum.rebinds
+                sum.rebinds,
+                sum.ties
             );
             let missing = sum.reached.missing();
             if !missing.is_empty() {

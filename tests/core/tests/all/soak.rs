@@ -1,6 +1,8 @@
 //! The core against the model, as far as every test run affords it; `cargo
 //! xtask soak` runs it for longer.
 
+use std::cell::Cell;
+
 use fitmac_core::{message::Output, reason, wire::Route};
 use fitmac_core_tests::soak::{Disagreement, Seen, TICKS, run, run_spoilt};
 
@@ -25,23 +27,34 @@ fn core_and_model_agree_on_300_000_ticks() {
             Err(disagreement) => panic!("{disagreement}"),
         }
     }
-    assert_eq!(sum.ticks, 300_000);
+    assert!(sum.ticks + sum.ties * TICKS >= 300_000, "{sum:?}");
+    assert!(sum.ties <= 1, "{sum:?}");
     assert!(sum.corrections > 6000 && sum.rebinds > 300, "{sum:?}");
     let mut missing = sum.reached.missing();
     missing.retain(|name| !RARE.contains(name));
     assert!(missing.is_empty(), "never occurred: {missing:?}");
 }
 
+#[test]
+fn a_limit_met_to_within_rounding_is_a_tie_and_ends_the_run() {
+    // The target drew back by the limit of `moving_away`, 1e-17 m more or less.
+    let seen = run(4932, TICKS).expect("no disagreement");
+    assert!(seen.ties == 1 && seen.ticks < TICKS, "{seen:?}");
+}
+
 /// The first disagreement with a core that is spoilt.
 fn noticed(spoil: impl Fn(&mut Output) -> bool) -> Disagreement {
     for seed in 0..50 {
-        let mut spoilt = None;
-        let result = run_spoilt(seed, TICKS, |tick, output| {
-            if spoilt.is_none() && spoil(output) {
-                spoilt = Some(tick);
+        let spoilt = Cell::new(None);
+        let result = run_spoilt(seed, TICKS, || {
+            spoilt.set(None);
+            |tick, output: &mut Output| {
+                if spoilt.get().is_none() && spoil(output) {
+                    spoilt.set(Some(tick));
+                }
             }
         });
-        match (result, spoilt) {
+        match (result, spoilt.get()) {
             (Err(d), Some(tick)) => {
                 assert_eq!(d.tick, tick, "in the same tick");
                 return d;
