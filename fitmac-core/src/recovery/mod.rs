@@ -384,6 +384,7 @@ impl Active {
     fn grip(&self, scene: &Scene<'_>) -> Grip {
         match &self.running {
             Running::Place(place) if place.is_carrying() => Grip::Close,
+            Running::Pick(pick) if pick.is_closing() => Grip::Close,
             _ if scene.signals.gripper.state != GripperState::Open => Grip::Close,
             _ => Grip::Open,
         }

@@ -105,6 +105,11 @@ impl Pick {
         }
     }
 
+    /// Closing, or testing what the closed gripper holds.
+    pub(super) const fn is_closing(&self) -> bool {
+        matches!(self.step, Step::Close { .. } | Step::LiftTest { .. })
+    }
+
     pub(super) fn step(&mut self, scene: &Scene<'_>, target: &TargetView) -> Flow<Outcome> {
         match self.step {
             Step::SetDown {

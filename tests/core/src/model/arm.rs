@@ -381,7 +381,9 @@ impl Arm {
     }
 
     fn idle_grip(&self, scene: &Scene<'_>) -> f64 {
-        if !self.carrying() && scene.look.pads == Pads::Open {
+        let shut =
+            self.carrying() || matches!(self.stage, Stage::Close { .. } | Stage::Test { .. });
+        if !shut && scene.look.pads == Pads::Open {
             OPEN
         } else {
             CLOSE
