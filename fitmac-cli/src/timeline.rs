@@ -40,7 +40,7 @@ pub(crate) fn read_decisions(trace: &std::path::Path) -> anyhow::Result<Vec<Trac
     let reader = TraceReader::open(trace)?;
     let ticks = reader.filter_map(|record| match record {
         Record::Tick(tick) => Some(tick.output),
-        Record::Prompt(..) | Record::Status(_) => None,
+        Record::Prompt(..) | Record::ModelCall(..) | Record::Status(_) => None,
     });
     Ok(ticks
         .flat_map(|output| [output.event, output.trace])

@@ -1,5 +1,5 @@
 //! The messages that travel between the processes: the core's own, whose
-//! layouts stand here, and three that the core never sees.
+//! layouts stand here, and four that the core never sees.
 
 use fitmac_core::message::{
     ActionChunk, Candidate, Command, CriticReport, GroundingRecord, ObjectSample, Plan,
@@ -65,11 +65,103 @@ impl PromptText {
     /// # Errors
     /// If the message was malformed: it comes from another process.
     pub fn text(&self) -> Result<&str, PromptError> {
-        usize::try_from(self.length)
-            .ok()
-            .and_then(|n| self.text.get(..n))
-            .and_then(|bytes| core::str::from_utf8(bytes).ok())
-            .ok_or(PromptError::NotText)
+        text_of(self.length, &self.text).ok_or(PromptError::NotText)
+    }
+}
+
+/// The text in the first `length` of some bytes, if that is what they hold.
+fn text_of(length: u64, bytes: &[u8]) -> Option<&str> {
+    let used = bytes.get(..usize::try_from(length).ok()?)?;
+    core::str::from_utf8(used).ok()
+}
+
+/// Longest outcome of a model call, bytes.
+pub const OUTCOME_CAPACITY: usize = 32;
+
+/// Which agent asked a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ModelRole {
+    /// The planner.
+    Planner = 1,
+    /// The grounder's resolver.
+    Resolver = 2,
+    /// The critic.
+    Critic = 3,
+}
+
+impl ModelRole {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Planner, Self::Resolver, Self::Critic];
+
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Planner => "planner",
+            Self::Resolver => "resolver",
+            Self::Critic => "critic",
+        }
+    }
+}
+
+/// A call of a language or vision model that came to its end, for the trace.
+/// It travels from the agents to the recorder and never enters the core.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ModelCall {
+    /// When it was asked, ns.
+    pub asked_ns: u64,
+    /// From asking to the end, ns.
+    pub latency_ns: u64,
+    /// Requests sent.
+    pub attempts: u32,
+    /// The subtask that it was for.
+    pub subtask: u32,
+    /// [`ModelRole`].
+    pub role: u8,
+    /// Zero.
+    pub reserved: [u8; 7],
+    /// Bytes of the outcome.
+    pub length: u64,
+    /// UTF-8, zero beyond `length`.
+    pub outcome: [u8; OUTCOME_CAPACITY],
+}
+
+impl ModelCall {
+    /// A record without an outcome.
+    #[must_use]
+    pub const fn new(role: ModelRole, subtask: u32, asked_ns: u64, latency_ns: u64) -> Self {
+        Self {
+            asked_ns,
+            latency_ns,
+            attempts: 0,
+            subtask,
+            role: role as u8,
+            reserved: [0; 7],
+            length: 0,
+            outcome: [0; OUTCOME_CAPACITY],
+        }
+    }
+
+    /// The same with what came of it, "ok" or what went wrong in a word (cut
+    /// after [`OUTCOME_CAPACITY`] bytes), after so many requests.
+    #[must_use]
+    pub fn ended(mut self, outcome: &str, attempts: u32) -> Self {
+        let end = outcome.floor_char_boundary(OUTCOME_CAPACITY);
+        for (to, from) in self.outcome.iter_mut().zip(outcome.bytes().take(end)) {
+            *to = from;
+        }
+        self.length = end as u64;
+        self.attempts = attempts;
+        self
+    }
+
+    /// What came of it; `None` if the message was malformed: it comes from
+    /// another process.
+    #[must_use]
+    pub fn outcome(&self) -> Option<&str> {
+        text_of(self.length, &self.outcome)
     }
 }
 
@@ -199,6 +291,15 @@ layout!(PromptText, "PromptText" {
     prompt_id, subtask, epoch, length, text: Meaning::Text("length"),
 });
 
+layout!(ModelCall, "ModelCall" {
+    asked_ns, latency_ns, attempts, subtask,
+    role: Meaning::Code(Vocabulary {
+        name: "ModelRole",
+        members: || ModelRole::ALL.iter().map(|m| (*m as u8, m.name())).collect(),
+    }),
+    reserved, length, outcome: Meaning::Text("length"),
+});
+
 layout!(OperatorRequest, "OperatorRequest" { request: code!(Request), reserved });
 
 layout!(Status, "Status" {
@@ -227,6 +328,16 @@ mod tests {
         torn.length = 28; // ends inside the dash
         torn.text[25] = 0xff;
         assert_eq!(torn.text(), Err(PromptError::NotText));
+    }
+
+    #[test]
+    fn the_outcome_of_a_call_is_cut_between_letters() {
+        let call = ModelCall::new(ModelRole::Critic, 0, 1, 2);
+        assert_eq!(call.ended("ok", 1).outcome(), Some("ok"));
+        let long = call.ended(&"ö".repeat(17), 3);
+        assert_eq!(long.outcome(), Some(&*"ö".repeat(16)));
+        let torn = ModelCall { length: 33, ..long };
+        assert_eq!(torn.outcome(), None);
     }
 
     #[test]

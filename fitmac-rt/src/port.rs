@@ -59,6 +59,15 @@ impl<T: Payload, Tr: Transport> Sender<T, Tr> {
         )
     }
 
+    /// Hands the service's history to receivers that came since the last
+    /// message.
+    ///
+    /// # Errors
+    /// If the transport failed.
+    pub fn refresh(&mut self) -> Result<(), TransportFault> {
+        self.writer.refresh()
+    }
+
     /// Sends a message under any header: for tests of the receivers.
     ///
     /// # Errors

@@ -7,7 +7,7 @@ use fitmac_core::message::{
     StateSample, TraceRecord, VerifierReport,
 };
 
-use crate::message::{OperatorRequest, PromptText, Status};
+use crate::message::{ModelCall, OperatorRequest, PromptText, Status};
 
 /// A named stream of one message type.
 #[derive(Debug)]
@@ -80,6 +80,9 @@ pub const CRITIC: Service<CriticReport> = Service::new("critic", 4, 0);
 /// Prompt texts. From the agents to the policy; one a subtask and epoch, all
 /// kept for a policy that starts late.
 pub const PROMPT: Service<PromptText> = Service::new("prompt", 16, 16);
+/// Model calls that came to their end. From the agents to the recorder; those
+/// before it is there are kept.
+pub const MODEL_CALL: Service<ModelCall> = Service::new("model_call", 16, 16);
 /// Requests of operators and supervisors; several may be connected.
 pub const REQUEST: Service<OperatorRequest> = Service::new("request", 8, 0).with_publishers(4);
 /// Trace records, for live views. From the controller's telemetry thread.

@@ -16,7 +16,7 @@ use crate::{
     frame::Tick,
     instance::{Instance, InstanceError},
     layout::Payload,
-    message::{COUNTER_CAPACITY, PromptText, Status},
+    message::{COUNTER_CAPACITY, ModelCall, PromptText, Status},
     port::{Receiver, Sender, Session},
     realtime,
     ring::RingReader,
@@ -44,6 +44,15 @@ pub trait Consume: Send {
     /// If it could not be kept; the consumer is not called again.
     fn prompt(&mut self, now_ns: u64, prompt: &PromptText) -> io::Result<()> {
         let _ = (now_ns, prompt);
+        Ok(())
+    }
+
+    /// Takes a model call that ended at `now_ns`.
+    ///
+    /// # Errors
+    /// If it could not be kept; the consumer is not called again.
+    fn model_call(&mut self, now_ns: u64, call: &ModelCall) -> io::Result<()> {
+        let _ = (now_ns, call);
         Ok(())
     }
 
@@ -154,6 +163,7 @@ struct Ends {
     status: Sender<Status, Ipc>,
     trace: Sender<TraceRecord, Ipc>,
     prompt: Receiver<PromptText, Ipc>,
+    model_call: Receiver<ModelCall, Ipc>,
 }
 
 impl Ends {
@@ -163,6 +173,7 @@ impl Ends {
             status: Sender::connect(&transport, &service::STATUS, session)?,
             trace: Sender::connect(&transport, &service::TRACE, session)?,
             prompt: Receiver::connect(&transport, &service::PROMPT)?,
+            model_call: Receiver::connect(&transport, &service::MODEL_CALL)?,
         })
     }
 }
@@ -229,7 +240,7 @@ impl Worker {
         loop {
             let finished = self.ring.is_finished();
             let idle = !self.drain();
-            self.prompts();
+            self.texts();
             self.report();
             if finished {
                 break;
@@ -269,11 +280,18 @@ impl Worker {
         any
     }
 
-    fn prompts(&mut self) {
+    /// Takes prompts and model calls.
+    fn texts(&mut self) {
         while let Some(envelope) = self.ends.prompt.poll() {
             let (now_ns, prompt) = (envelope.header.stamp_ns, envelope.payload);
             for consumer in &mut self.consumers {
                 consumer.take(&self.cadence, |c| c.prompt(now_ns, &prompt));
+            }
+        }
+        while let Some(envelope) = self.ends.model_call.poll() {
+            let (now_ns, call) = (envelope.header.stamp_ns, envelope.payload);
+            for consumer in &mut self.consumers {
+                consumer.take(&self.cadence, |c| c.model_call(now_ns, &call));
             }
         }
     }

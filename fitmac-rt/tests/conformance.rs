@@ -91,6 +91,12 @@ fn late_receivers_get_the_history_and_no_more<Tr: Transport>(t: &Tr) {
         .expect("sends");
     assert_eq!(late.poll().map(|e| e.payload.sequence), Some(4));
     assert!(without.poll().is_none(), "the chunk service keeps nothing");
+    // One that seldom sends refreshes instead.
+    let mut later = receiver(t, &service::STATE);
+    state.refresh().expect("sends");
+    assert_eq!(later.poll().map(|e| e.payload.sequence), Some(4));
+    state.refresh().expect("sends");
+    assert!(later.poll().is_none(), "the history comes once");
 
     let mut prompts = sender(t, &service::PROMPT);
     let mut texts = receiver(t, &service::PROMPT);

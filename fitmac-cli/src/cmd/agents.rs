@@ -4,15 +4,13 @@
 //! the poses from the state samples.
 
 use std::{
-    fs::File,
-    io::Write as _,
-    path::{Path, PathBuf},
+    path::PathBuf,
     time::{Duration, Instant},
 };
 
 use anyhow::Context;
 use fitmac_agents::{
-    model::{CallRecord, Calls},
+    model::{CallRecord, Calls, Role},
     scene::{Detection, Scene, Table},
     service::{AgentService, Event, ServiceParams},
 };
@@ -21,8 +19,13 @@ use fitmac_core::{
     wire::GraspClass,
 };
 use fitmac_rt::{
-    clock, endpoint::AgentsEndpoint, instance::Instance, message::PromptText, port::Session,
-    signals::Signals, transport::Ipc,
+    clock,
+    endpoint::AgentsEndpoint,
+    instance::Instance,
+    message::{ModelCall, ModelRole, PromptText},
+    port::Session,
+    signals::Signals,
+    transport::Ipc,
 };
 use sim_harness::pose::Pose;
 
@@ -49,7 +52,8 @@ const TABLE_HALF_M: [f64; 2] = [0.4, 0.55];
   fitmac agents --instance cell --card scene.json --model-url http://127.0.0.1:8000/v1 --model qwen
 
 Rules first: a model, if one is named, is asked where the rules are unsure, in threads of its
-own; whatever becomes of a call is written to --calls as a JSON line. `fitmac help sim` shows the whole set of processes.")]
+own; what becomes of a call stands in the controller's trace (`fitmac trace events FILE`).
+`fitmac help sim` shows the whole set of processes.")]
 pub(crate) struct Args {
     /// The running system to join.
     #[arg(long, default_value = "default")]
@@ -59,9 +63,6 @@ pub(crate) struct Args {
     card: PathBuf,
     #[command(flatten)]
     model: ModelArgs,
-    /// Append a JSON line for every model call: who asked, when, how long, what came of it.
-    #[arg(long, value_name = "FILE", requires = "model_url")]
-    calls: Option<PathBuf>,
     /// The instruction, instead of the card's.
     #[arg(long, value_name = "TEXT")]
     instruction: Option<String>,
@@ -78,7 +79,6 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
         .unwrap_or(&card.instruction)
         .clone();
     let calls = args.model.chat()?.map(Calls::new);
-    let record = args.calls.as_deref().map(call_file).transpose()?;
     let instance = Instance::named(&args.instance)?;
     let transport = Ipc::join(&instance)?;
     let session = Session::start();
@@ -93,7 +93,6 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
         ),
         card,
         subtask: 0,
-        record,
     };
     let planned = agents.service.on_instruction(clock::now_ns(), &instruction);
     planned.map_err(|error| BadInput(error.to_string()))?;
@@ -105,6 +104,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
         if due && agents.look()? {
             seen = Some(Instant::now());
         }
+        agents.endpoint.refresh()?;
         agents.listen();
         agents.speak()?;
         std::thread::sleep(LOOK);
@@ -119,8 +119,6 @@ struct Agents {
     card: Card,
     /// The subtask that the controller is at.
     subtask: u32,
-    /// Where model calls are recorded.
-    record: Option<File>,
 }
 
 impl Agents {
@@ -136,21 +134,23 @@ impl Agents {
         Ok(true)
     }
 
-    /// Keeps a call's record; a call that failed is also said.
+    /// Sends a call's record to the trace; a call that failed is also said.
     fn recorded(&mut self, call: &CallRecord) -> anyhow::Result<()> {
+        let role = match call.role {
+            Role::Planner => ModelRole::Planner,
+            Role::Resolver => ModelRole::Resolver,
+            Role::Critic => ModelRole::Critic,
+        };
         if call.outcome != "ok" {
-            let role = format!("{:?}", call.role).to_lowercase();
+            let role = role.name();
             eprintln!(
                 "fitmac agents: the model didn't help the {role}: {}",
                 call.outcome
             );
         }
-        if let Some(record) = &mut self.record {
-            let line = serde_json::to_string(call)? + "\n";
-            record
-                .write_all(line.as_bytes())
-                .context("the record of model calls")?;
-        }
+        let message = ModelCall::new(role, self.subtask, call.asked_ns, call.latency_ns)
+            .ended(call.outcome, call.attempts);
+        self.endpoint.send_model_call(clock::now_ns(), &message)?;
         Ok(())
     }
 
@@ -186,14 +186,6 @@ impl Agents {
         }
         Ok(())
     }
-}
-
-fn call_file(path: &Path) -> anyhow::Result<File> {
-    File::options()
-        .create(true)
-        .append(true)
-        .open(path)
-        .with_context(|| BadInput(format!("--calls {}: can't be written", path.display())))
 }
 
 /// The scene as a detector with a clear view reports it.

@@ -10,6 +10,7 @@ use anyhow::Context;
 use fitmac_core::{intake::Refusal, message::TraceRecord, reason, wire::EventKind, wire::Mode};
 use fitmac_rt::{
     counters,
+    message::{ModelCall, ModelRole},
     trace::{FOXGLOVE_LAYOUT, Record, TraceReader, write_csv},
 };
 
@@ -19,7 +20,7 @@ use crate::exit::{BadInput, Exit};
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Examples:
   fitmac trace info run.mcap                what is in it, how long, what was counted
-  fitmac trace events run.mcap              refusals and changes of mode, one a line
+  fitmac trace events run.mcap              refusals, changes of mode, model calls, one a line
   fitmac trace csv run.mcap -o run.csv      one row a tick, for PlotJuggler
   fitmac trace layout -o fitmac.json        a layout for Foxglove: import it there
 
@@ -36,7 +37,7 @@ enum Action {
         /// The trace.
         file: PathBuf,
     },
-    /// Refusals and changes of mode.
+    /// Refusals, changes of mode, model calls.
     Events {
         /// The trace.
         file: PathBuf,
@@ -136,6 +137,7 @@ fn info(path: &Path) -> anyhow::Result<Exit> {
                 seen.prompts
                     .push(prompt.text().unwrap_or("?").escape_default().to_string());
             }
+            Record::ModelCall(..) => seen.model_calls += 1,
             Record::Status(newest) => status = Some(newest),
         }
     }
@@ -157,6 +159,7 @@ fn info(path: &Path) -> anyhow::Result<Exit> {
         "decisions    {} queries, {} events",
         seen.queries, seen.events
     );
+    println!("model calls  {}", seen.model_calls);
     seen.prompts
         .iter()
         .for_each(|text| println!("prompt       {text}"));
@@ -187,19 +190,35 @@ struct Seen {
     groundings: u64,
     queries: u64,
     events: u64,
+    model_calls: u64,
     prompts: Vec<String>,
 }
 
 fn events(path: &Path) -> anyhow::Result<Exit> {
     let mut reader = open(path)?;
     let mut start_ns = None;
+    let mut earlier = Vec::new();
     for record in &mut reader {
-        let Record::Tick(tick) = record else { continue };
-        let start_ns = *start_ns.get_or_insert(tick.head.now_ns);
-        if let Some(event) = &tick.output.event {
-            let time_s = event.stamp_ns.saturating_sub(start_ns) as f64 / 1e9;
-            let reasons = tick.output.command.reasons;
-            println!("{time_s:>10.4} s  {}", describe(event, reasons));
+        match record {
+            Record::Tick(tick) => {
+                let start_ns = *start_ns.get_or_insert_with(|| {
+                    earlier
+                        .iter()
+                        .for_each(|call| print_call(call, tick.head.now_ns));
+                    tick.head.now_ns
+                });
+                if let Some(event) = &tick.output.event {
+                    let reasons = tick.output.command.reasons;
+                    let time_s = seconds_after(event.stamp_ns, start_ns);
+                    println!("{time_s:>10.4} s  {}", describe(event, reasons));
+                }
+            }
+            Record::ModelCall(_, call) => match start_ns {
+                Some(start_ns) => print_call(&call, start_ns),
+                // The agents may be up before the controller.
+                None => earlier.push(*call),
+            },
+            Record::Prompt(..) | Record::Status(_) => {}
         }
     }
     warn(&reader);
@@ -219,4 +238,22 @@ fn describe(event: &TraceRecord, reasons: u64) -> String {
         }
         Err(unknown) => unknown.to_string(),
     }
+}
+
+/// A model call; its time is when it was asked.
+fn print_call(call: &ModelCall, start_ns: u64) {
+    let role = ModelRole::ALL.iter().find(|role| **role as u8 == call.role);
+    println!(
+        "{:>10.4} s  model call of the {}: {} after {:.3} s, {} request(s)",
+        seconds_after(call.asked_ns, start_ns),
+        role.map_or("unknown", |role| role.name()),
+        call.outcome().unwrap_or("?").escape_default(),
+        call.latency_ns as f64 / 1e9,
+        call.attempts
+    );
+}
+
+/// Time from one stamp to another, s; negative if it was before.
+fn seconds_after(stamp_ns: u64, start_ns: u64) -> f64 {
+    stamp_ns.wrapping_sub(start_ns).cast_signed() as f64 / 1e9
 }

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | [`HarnessEndpoint`] (robot or simulator) | state, verifier | command |
 //! | [`PolicyEndpoint`] | chunk | query, state, prompt |
-//! | [`AgentsEndpoint`] | plan, grounding, critic, prompt | rebind, state |
+//! | [`AgentsEndpoint`] | plan, grounding, critic, prompt, model_call | rebind, state |
 //! | [`ControllerEndpoint`] | command, query, rebind | all the others |
 //! | [`Tap`] (live views) | nothing | everything |
 //! | [`OperatorEndpoint`] | request | status |

@@ -9,7 +9,7 @@ use fitmac_core::{
 };
 
 use crate::{
-    message::{OperatorRequest, PromptText, Status},
+    message::{ModelCall, OperatorRequest, PromptText, Status},
     port::{Receiver, Sender, Session},
     service,
     transport::{ConnectError, Transport, TransportFault},
@@ -88,6 +88,7 @@ pub struct AgentsEndpoint<Tr: Transport> {
     grounding: Sender<GroundingRecord, Tr>,
     critic: Sender<CriticReport, Tr>,
     prompt: Sender<PromptText, Tr>,
+    model_call: Sender<ModelCall, Tr>,
     rebind: Receiver<RebindRequest, Tr>,
     state: Receiver<StateSample, Tr>,
     command: Receiver<Command, Tr>,
@@ -104,10 +105,22 @@ impl<Tr: Transport> AgentsEndpoint<Tr> {
             grounding: Sender::connect(transport, &service::GROUNDING, session)?,
             critic: Sender::connect(transport, &service::CRITIC, session)?,
             prompt: Sender::connect(transport, &service::PROMPT, session)?,
+            model_call: Sender::connect(transport, &service::MODEL_CALL, session)?,
             rebind: Receiver::connect(transport, &service::REBIND)?,
             state: Receiver::connect(transport, &service::STATE)?,
             command: Receiver::connect(transport, &service::COMMAND)?,
         })
+    }
+
+    /// Hands plan, prompts and model calls to a controller, policy or recorder
+    /// that came after they were sent. Call it now and then.
+    ///
+    /// # Errors
+    /// If the transport failed.
+    pub fn refresh(&mut self) -> Result<(), TransportFault> {
+        self.plan.refresh()?;
+        self.prompt.refresh()?;
+        self.model_call.refresh()
     }
 
     /// The next request to ground the target.
@@ -169,6 +182,14 @@ impl<Tr: Transport> AgentsEndpoint<Tr> {
     ) -> Result<(), TransportFault> {
         report.sequence = self.critic.sequence().wrapping_add(1);
         self.critic.send(now_ns, report)
+    }
+
+    /// Tells the recorder of a model call that came to its end.
+    ///
+    /// # Errors
+    /// If the transport failed.
+    pub fn send_model_call(&mut self, now_ns: u64, call: &ModelCall) -> Result<(), TransportFault> {
+        self.model_call.send(now_ns, call)
     }
 
     /// The sending end of the grounding, for tests that send what sound agents would not.
@@ -234,6 +255,8 @@ pub struct Tap<Tr: Transport> {
     pub grounding: Receiver<GroundingRecord, Tr>,
     /// Prompts.
     pub prompt: Receiver<PromptText, Tr>,
+    /// Model calls.
+    pub model_call: Receiver<ModelCall, Tr>,
     /// Decisions and events.
     pub trace: Receiver<TraceRecord, Tr>,
     /// Health.
@@ -256,6 +279,7 @@ impl<Tr: Transport> Tap<Tr> {
             plan: Receiver::connect(transport, &service::PLAN)?,
             grounding: Receiver::connect(transport, &service::GROUNDING)?,
             prompt: Receiver::connect(transport, &service::PROMPT)?,
+            model_call: Receiver::connect(transport, &service::MODEL_CALL)?,
             trace: Receiver::connect(transport, &service::TRACE)?,
             status: Receiver::connect(transport, &service::STATUS)?,
         })

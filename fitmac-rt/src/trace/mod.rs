@@ -10,9 +10,10 @@
 //! | `/trace` | what it decided | one a query |
 //! | `/event` | refusals and changes of mode | as they happen |
 //! | `/prompt`, `/status` | texts; health and counters | as sent; 10 Hz |
+//! | `/model_call` | what a model was asked, how long it took, what came of it | as they end |
 //! | `/tf`, `/scene`, `/log` | Foxglove's own: frames, shapes, messages | 25 Hz; each change of decision |
 //!
-//! All rows but the last two, in the order of the file, are all that a replay needs.
+//! All rows but the last three, in the order of the file, are all that a replay needs.
 //! Times are nanoseconds of the monotonic clock: viewers show dates of 1970.
 
 pub mod codec;

@@ -21,7 +21,7 @@ use super::{codec, schema, writer::METADATA_NAME, writer::Metadata};
 use crate::{
     frame::{Tick, TickHead, contents},
     layout::{Layout, Payload},
-    message::{PromptText, Status},
+    message::{ModelCall, PromptText, Status},
 };
 
 /// Longest record that we read: a hostile length must not exhaust memory.
@@ -34,6 +34,8 @@ pub enum Record {
     Tick(Box<Tick>),
     /// A prompt's text, and when it was sent, ns.
     Prompt(u64, Box<PromptText>),
+    /// A model call, and when its end was told, ns.
+    ModelCall(u64, Box<ModelCall>),
     /// The loop's health.
     Status(Box<Status>),
 }
@@ -106,11 +108,12 @@ enum Topic {
     Trace,
     Event,
     Prompt,
+    ModelCall,
     Status,
 }
 
 impl Topic {
-    const ALL: [(&str, Self); 14] = [
+    const ALL: [(&str, Self); 15] = [
         ("/tick", Self::Tick),
         ("/state", Self::State),
         ("/chunk", Self::Chunk),
@@ -124,6 +127,7 @@ impl Topic {
         ("/trace", Self::Trace),
         ("/event", Self::Event),
         ("/prompt", Self::Prompt),
+        ("/model_call", Self::ModelCall),
         ("/status", Self::Status),
     ];
 
@@ -144,6 +148,7 @@ impl Topic {
             Self::Rebind => of::<RebindRequest>(),
             Self::Trace | Self::Event => of::<TraceRecord>(),
             Self::Prompt => of::<PromptText>(),
+            Self::ModelCall => of::<ModelCall>(),
             Self::Status => of::<Status>(),
         }
     }
@@ -166,6 +171,7 @@ pub fn layout_of(topic: &str) -> Option<Layout> {
         Topic::Rebind => RebindRequest::LAYOUT,
         Topic::Trace | Topic::Event => TraceRecord::LAYOUT,
         Topic::Prompt => PromptText::LAYOUT,
+        Topic::ModelCall => ModelCall::LAYOUT,
         Topic::Status => Status::LAYOUT,
     })
 }
@@ -366,6 +372,10 @@ impl<R: Read> TraceReader<R> {
                 self.ready = Some(Record::Prompt(time, Box::new(get(data)?)));
                 return Ok(());
             }
+            Topic::ModelCall => {
+                self.ready = Some(Record::ModelCall(time, Box::new(get(data)?)));
+                return Ok(());
+            }
             Topic::Status => {
                 self.ready = Some(Record::Status(Box::new(get(data)?)));
                 return Ok(());
@@ -400,7 +410,7 @@ impl<R: Read> TraceReader<R> {
                 *has_command = true;
                 0
             }
-            Topic::Tick | Topic::Prompt | Topic::Status => 0,
+            Topic::Tick | Topic::Prompt | Topic::ModelCall | Topic::Status => 0,
         };
         Ok(())
     }

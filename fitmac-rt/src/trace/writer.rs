@@ -21,7 +21,7 @@ use super::{codec, scene::Scene, schema};
 use crate::{
     frame::{Tick, TickHead},
     layout::Payload,
-    message::{PromptText, Status},
+    message::{ModelCall, PromptText, Status},
     telemetry::Consume,
 };
 
@@ -58,6 +58,7 @@ struct Channels {
     trace: u16,
     event: u16,
     prompt: u16,
+    model_call: u16,
     status: u16,
     tf: u16,
     scene: u16,
@@ -95,6 +96,7 @@ impl<W: Write + Seek> TraceWriter<W> {
             trace: channel::<TraceRecord, _>(&mut mcap, "/trace")?,
             event: channel::<TraceRecord, _>(&mut mcap, "/event")?,
             prompt: channel::<PromptText, _>(&mut mcap, "/prompt")?,
+            model_call: channel::<ModelCall, _>(&mut mcap, "/model_call")?,
             status: channel::<Status, _>(&mut mcap, "/status")?,
             tf: foxglove_channel::<FrameTransforms, _>(&mut mcap, "/tf")?,
             scene: foxglove_channel::<SceneUpdate, _>(&mut mcap, "/scene")?,
@@ -159,6 +161,15 @@ impl<W: Write + Seek> TraceWriter<W> {
     /// If it cannot be written.
     pub fn prompt(&mut self, now_ns: u64, prompt: &PromptText) -> io::Result<()> {
         self.message(self.channels.prompt, At { now_ns, tick: 0 }, Some(prompt))
+    }
+
+    /// Writes a model call that ended at `now_ns`.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn model_call(&mut self, now_ns: u64, call: &ModelCall) -> io::Result<()> {
+        let at = At { now_ns, tick: 0 };
+        self.message(self.channels.model_call, at, Some(call))
     }
 
     /// Writes the loop's health.
@@ -299,6 +310,10 @@ impl Consume for TraceFile {
 
     fn prompt(&mut self, now_ns: u64, prompt: &PromptText) -> io::Result<()> {
         self.open()?.prompt(now_ns, prompt)
+    }
+
+    fn model_call(&mut self, now_ns: u64, call: &ModelCall) -> io::Result<()> {
+        self.open()?.model_call(now_ns, call)
     }
 
     fn status(&mut self, status: &Status) -> io::Result<()> {

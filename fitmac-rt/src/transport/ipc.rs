@@ -7,6 +7,7 @@ use iceoryx2::{
     port::{
         publisher::{Publisher, PublisherCreateError},
         subscriber::{Subscriber, SubscriberCreateError},
+        update_connections::UpdateConnections as _,
     },
     prelude::{BackpressureStrategy, Node, NodeBuilder, PortFactory as _, SignalHandlingMode, ipc},
     service::{
@@ -229,6 +230,12 @@ impl<T: Payload> Write<T> for IpcWriter<T> {
             .send()
             .map(|_receivers| ())
             .map_err(|_| TransportFault("a message could not be delivered"))
+    }
+
+    fn refresh(&mut self) -> Result<(), TransportFault> {
+        self.publisher
+            .update_connections()
+            .map_err(|_| TransportFault("a new receiver could not be connected"))
     }
 }
 

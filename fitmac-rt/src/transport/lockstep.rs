@@ -129,6 +129,11 @@ impl<T: Payload> Write<T> for LockstepWriter<T> {
         });
         Ok(())
     }
+
+    /// Receivers have the history from the start.
+    fn refresh(&mut self) -> Result<(), TransportFault> {
+        Ok(())
+    }
 }
 
 impl<T: Payload> Drop for LockstepWriter<T> {

@@ -47,6 +47,13 @@ pub trait Write<T: Payload> {
     /// # Errors
     /// If the transport failed; the message may have reached some receivers.
     fn write(&mut self, header: Header, payload: &T) -> Result<(), TransportFault>;
+
+    /// Hands the service's history to receivers that came since the last
+    /// message. Sending does it, too: this is for a sender that seldom sends.
+    ///
+    /// # Errors
+    /// If the transport failed.
+    fn refresh(&mut self) -> Result<(), TransportFault>;
 }
 
 /// The receiving end of a service.
