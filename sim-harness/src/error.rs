@@ -29,6 +29,35 @@ pub enum SimError {
         /// The names that exist.
         known: String,
     },
+    /// An error in one part of something larger.
+    #[error("{place}: {cause}")]
+    Within {
+        /// The part: a file, a task, an object, a field.
+        place: String,
+        /// What is wrong there.
+        cause: Box<SimError>,
+    },
+    /// Results of another version of the program.
+    #[error(
+        "{path}: its episodes were played by build {found}, this program is build {own}: they are not mixed; \
+         evaluate into another folder, or, if you know that the two decide alike, add `--accept-build {found}`"
+    )]
+    OtherBuild {
+        /// The file of results.
+        path: String,
+        /// The build that played them.
+        found: String,
+        /// The build of this program.
+        own: String,
+    },
+    /// Another program writes the same results.
+    #[error(
+        "{path}: another evaluation writes there: wait for its end, or give this one another `--out` or `--shard`"
+    )]
+    Busy {
+        /// The file that is locked.
+        path: String,
+    },
     /// MuJoCo refused the compiled scene.
     #[error("MuJoCo refused the scene: {0}")]
     Compile(String),
@@ -88,6 +117,32 @@ impl SimError {
             what,
             name: name.to_owned(),
             known,
+        }
+    }
+
+    /// The same error, with the part that it is in before it.
+    pub(crate) fn within(self, place: impl Into<String>) -> Self {
+        Self::Within {
+            place: place.into(),
+            cause: Box::new(self),
+        }
+    }
+
+    /// Whether what was given is wrong, and not the machine: trying again gives the same.
+    #[must_use]
+    pub fn is_bad_input(&self) -> bool {
+        match self {
+            Self::Data { .. }
+            | Self::Invalid { .. }
+            | Self::Unknown { .. }
+            | Self::OtherBuild { .. } => true,
+            Self::Within { cause, .. } => cause.is_bad_input(),
+            Self::Compile(_)
+            | Self::Diverged { .. }
+            | Self::Version { .. }
+            | Self::Io { .. }
+            | Self::Busy { .. }
+            | Self::Picture { .. } => false,
         }
     }
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
+use sha2::{Digest as _, Sha256};
 
 use crate::error::SimError;
 use crate::object::{Library, ObjectKind};
@@ -136,6 +137,9 @@ pub struct Suite {
     /// The tasks.
     #[serde(rename = "task")]
     pub tasks: Vec<Task>,
+    /// Of a suite from a file: the first digits of the file's SHA-256.
+    #[serde(skip)]
+    fingerprint: Option<String>,
 }
 
 /// What differs from the suite's own scene when one is built.
@@ -161,25 +165,68 @@ impl Suite {
         Self::parse(&format!("suites/{known}.toml"), text)
     }
 
+    /// An embedded suite by name, or the suite of a file, whose name ends in `.toml`.
+    ///
+    /// # Errors
+    /// As for [`Suite::embedded`] and [`Suite::parse`], and [`SimError::Io`] if the file can't be
+    /// read.
+    pub fn open(name: &str) -> Result<Self, SimError> {
+        if !name.ends_with(".toml") {
+            return Self::embedded(name);
+        }
+        let text = std::fs::read_to_string(name)
+            .map_err(|e| SimError::io(std::path::Path::new(name), e))?;
+        let digest = Sha256::digest(text.as_bytes());
+        let digits = digest.iter().take(4).map(|byte| format!("{byte:02x}"));
+        Ok(Self {
+            fingerprint: Some(digits.collect()),
+            ..Self::parse(name, &text)?
+        })
+    }
+
+    /// Of a suite from a file: the first eight hexadecimal digits of the file's SHA-256.
+    #[must_use]
+    pub fn fingerprint(&self) -> Option<&str> {
+        self.fingerprint.as_deref()
+    }
+
     /// Reads a suite and checks that all names in it resolve. `file` is the name that errors give.
     ///
     /// # Errors
-    /// [`SimError::Data`], [`SimError::Unknown`] or [`SimError::Invalid`], naming the key.
+    /// [`SimError::Data`], or [`SimError::Unknown`] or [`SimError::Invalid`] within the file, task
+    /// and key.
     pub fn parse(file: &str, text: &str) -> Result<Self, SimError> {
         let suite: Self = toml::from_str(text).map_err(|e| SimError::Data {
             file: file.to_owned(),
             message: e.to_string(),
         })?;
-        if suite.tasks.is_empty() {
-            return Err(SimError::invalid(
-                format!("suite `{}`", suite.name),
-                "it has no task",
-            ));
-        }
-        for task in &suite.tasks {
-            suite.check(task)?;
-        }
+        suite.check_all().map_err(|error| error.within(file))?;
         Ok(suite)
+    }
+
+    fn check_all(&self) -> Result<(), SimError> {
+        let wrong = |problem: &str| Err(SimError::invalid("the suite", problem));
+        if self.tasks.is_empty() {
+            return wrong("it has no task: add a [[task]]");
+        }
+        if self.max_steps == 0 {
+            return wrong("max_steps is 0; it must be positive");
+        }
+        for (name, region) in &self.regions {
+            let Region {
+                centre_m, half_m, ..
+            } = region;
+            let finite = centre_m.iter().chain(half_m).all(|m| m.is_finite());
+            if !finite || half_m.iter().any(|half| *half < 0.0) {
+                let problem = "centre_m and half_m must be finite, and half_m not negative";
+                return Err(SimError::invalid(format!("region `{name}`"), problem));
+            }
+        }
+        for task in &self.tasks {
+            self.check(task)
+                .map_err(|error| error.within(format!("task `{}`", task.name)))?;
+        }
+        Ok(())
     }
 
     /// A task by name.
@@ -249,14 +296,22 @@ impl Suite {
             .unwrap_or_else(|| self.arena.clone());
         let mut scene = Scene::new(arena);
         for object in &task.objects {
-            let mut kind = library.get(&object.kind)?.clone();
+            let field = |error: SimError, field: &str| {
+                error.within(format!("object `{}`, field `{field}`", object.name))
+            };
+            let mut kind = library
+                .get(&object.kind)
+                .map_err(|e| field(e, "kind"))?
+                .clone();
             if let Some(variant) = &alteration.variant
                 && object.name == task.target
             {
                 kind = altered(&kind, variant)?;
             }
             let kind = Arc::new(kind);
-            let region = self.region(&object.region)?;
+            let region = self
+                .region(&object.region)
+                .map_err(|e| field(e, "region"))?;
             let xy_m = place(region);
             match &region.on {
                 Some(support) => scene.put_on(&object.name, kind, support, xy_m, object.yaw_rad)?,
@@ -282,16 +337,28 @@ impl Suite {
     fn check(&self, task: &Task) -> Result<(), SimError> {
         let scene = self.nominal_scene(task)?;
         let named = [
-            &task.target,
-            &task.destination,
-            &task.pos.object,
-            &task.other.object,
+            ("target", Some(&task.target)),
+            ("destination", Some(&task.destination)),
+            ("pos.move", Some(&task.pos.object)),
+            ("pos.with", task.pos.with.as_ref()),
+            ("pos.onto", task.pos.onto.as_ref()),
+            ("other.object", Some(&task.other.object)),
         ];
-        let partners = task.pos.with.iter().chain(&task.pos.onto);
-        for name in named.into_iter().chain(partners) {
-            scene.by_name(name)?;
+        for (field, name) in named {
+            let Some(name) = name else { continue };
+            scene
+                .by_name(name)
+                .map_err(|error| error.within(format!("field `{field}`")))?;
         }
-        let wrong = |problem: &str| SimError::invalid(format!("task `{}`", task.name), problem);
+        let wrong = |problem: &str| SimError::invalid("the task", problem);
+        let twice = task
+            .objects
+            .iter()
+            .enumerate()
+            .any(|(i, o)| task.objects[..i].iter().any(|p| p.name == o.name));
+        if twice {
+            return Err(wrong("two of its objects have the same name"));
+        }
         if task.target == task.other.object || task.target == task.destination {
             return Err(wrong(
                 "target, other and destination must be different objects",
@@ -301,7 +368,9 @@ impl Suite {
             return Err(wrong("pos needs either `with` or `onto`"));
         }
         if task.paraphrases.is_empty() {
-            return Err(wrong("it has no paraphrase"));
+            return Err(wrong(
+                "it has no paraphrase: `paraphrases` needs one for sem",
+            ));
         }
         if !(0.2..=3.0).contains(&task.variant.scale) {
             return Err(wrong("the variant's scale must lie in 0.2 to 3"));

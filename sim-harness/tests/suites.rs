@@ -98,15 +98,20 @@ fn a_malformed_suite_is_refused_with_its_key() {
         (
             r#"kind = "milk", region = "target""#,
             r#"kind = "milkshake", region = "target""#,
-            "milkshake",
+            "object `milk`, field `kind`: unknown object `milkshake`; known are",
         ),
-        (r#"region = "basket""#, r#"region = "cellar""#, "cellar"),
+        (
+            r#"region = "basket""#,
+            r#"region = "cellar""#,
+            "field `region`: unknown region `cellar`; known are",
+        ),
         (
             r#"destination = "basket""#,
             r#"destination = "shelf""#,
-            "shelf",
+            "field `destination`: unknown",
         ),
         ("max_steps = 280", "max_step = 280", "max_step"),
+        ("max_steps = 280", "max_steps = 0", "max_steps is 0"),
         (r#"relation = "in""#, r#"relation = "beside""#, "beside"),
     ];
     for (from, to, named) in cases {
@@ -114,7 +119,10 @@ fn a_malformed_suite_is_refused_with_its_key() {
         let error = Suite::parse("mine.toml", &good.replace(from, to))
             .unwrap_err()
             .to_string();
-        assert!(error.contains(named), "{named}: {error}");
+        assert!(
+            error.contains(named) && error.starts_with("mine.toml: "),
+            "{named}: {error}"
+        );
     }
     let empty = "name = \"x\"\nmax_steps = 10\ntask = []\n[regions]\n";
     assert!(

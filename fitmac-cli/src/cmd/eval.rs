@@ -7,7 +7,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use sim_harness::{
     SimError,
     evaluation::{
-        self, Config, Grid, Knowledge, Preset, Profile, Progress, Shard, Summary, Vision,
+        self, Config, Destination, Grid, Knowledge, Preset, Profile, Progress, Shard, Summary,
+        Vision,
     },
     perturb::{Level, Perturbation},
 };
@@ -22,19 +23,23 @@ use crate::exit::{BadInput, Exit};
   fitmac eval --suite object --perturbation pos,task --config base,full \\
       --seeds 1000,1001 --episodes 5 --out out/try
   fitmac eval --preset main --shard 0/4 --out out/main    a quarter, for a scheduler
+  fitmac eval --suite my-suite.toml --out out/mine        tasks of your own
 
 Each option takes several values, separated by commas. A configuration is base,
 full, wo-target, wo-execution, wo-hard-pick or wo-hard-place; a parameter is
 changed by adding it, as in full+gate.failure_streak=2. Results are appended to
-OUT/*.jsonl as they come; the same command goes on where a killed one ended.
-`fitmac report OUT` makes tables and plots of them.
+OUT/*.jsonl as they come; the same command goes on where a killed one ended, and
+presets that have episodes in common play them once if they share OUT. Results of
+another build of the program are refused, as they may differ. `fitmac report OUT`
+makes tables and plots of them.
 
 Seeds 1000 to 9999 are for choosing parameters; reports use 7, 11, 13, 17, 23.")]
 pub(crate) struct Args {
-    /// A named experiment; the options below change it.
-    #[arg(long, value_name = "NAME")]
-    preset: Option<String>,
-    /// Suites: object, spatial.
+    /// Named experiments, played in this order: main, harm, backbones, ablation, seeds, sweeps,
+    /// contrast, displacement, ablation-pi05, smoke. The options below change all of them.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    preset: Vec<String>,
+    /// Suites: object, spatial, or a file like sim-harness/assets/suites/object.toml.
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     suite: Vec<String>,
     /// Tasks; all of the suite if left out.
@@ -76,6 +81,9 @@ pub(crate) struct Args {
     /// Run share I of N only, from 0.
     #[arg(long, value_name = "I/N", default_value = "0/1")]
     shard: String,
+    /// Count episodes of these builds as played: for changes that decide nothing.
+    #[arg(long, value_delimiter = ',', value_name = "BUILDS")]
+    accept_build: Vec<String>,
     /// Threads; 0 for all cores.
     #[arg(long, default_value_t = 0)]
     jobs: usize,
@@ -86,7 +94,7 @@ pub(crate) struct Args {
 
 /// Runs what is missing.
 pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
-    let grid = grid(args).map_err(|error| BadInput(error.to_string()))?;
+    let grids = grids(args).map_err(|error| BadInput(error.to_string()))?;
     let shard = Shard::parse(&args.shard).map_err(|error| BadInput(error.to_string()))?;
     let signals = Signals::listen()?;
     let stop = AtomicBool::new(false);
@@ -114,15 +122,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
             }
         }
     };
+    let destination = Destination {
+        folder: &args.out,
+        shard,
+        accepted_builds: &args.accept_build,
+    };
     let summary =
-        evaluation::run(&grid, shard, &args.out, args.jobs, &stop, &watch).map_err(|error| {
-            match error {
-                unknown @ (SimError::Unknown { .. } | SimError::Invalid { .. }) => {
-                    anyhow::Error::new(BadInput(unknown.to_string()))
-                }
-                other => other.into(),
-            }
-        })?;
+        evaluation::run(&grids, &destination, args.jobs, &stop, &watch).map_err(explained)?;
     bar.finish_and_clear();
     print(args, &summary, began.elapsed().as_secs_f64());
     Ok(if summary.stopped {
@@ -130,6 +136,23 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
     } else {
         Exit::Done
     })
+}
+
+/// The error with its exit status, and what became of the episodes.
+fn explained(error: SimError) -> anyhow::Error {
+    if error.is_bad_input() {
+        return BadInput(error.to_string()).into();
+    }
+    let unwritten = matches!(error, SimError::Io { .. });
+    let error = anyhow::Error::new(error);
+    if unwritten {
+        error.context(
+            "results could not be written; finished episodes are kept: make room, or give another \
+             --out, and the same command goes on",
+        )
+    } else {
+        error
+    }
 }
 
 fn print(args: &Args, summary: &Summary, wall_s: f64) {
@@ -166,15 +189,21 @@ fn print(args: &Args, summary: &Summary, wall_s: f64) {
     }
 }
 
-/// The grid that the arguments ask for.
-fn grid(args: &Args) -> Result<Grid, SimError> {
-    let mut grid = match &args.preset {
-        Some(name) => Preset::by_name(name)?.grid()?,
-        None => Grid {
+/// The grids that the arguments ask for.
+fn grids(args: &Args) -> Result<Vec<Grid>, SimError> {
+    if args.preset.is_empty() {
+        let plain = Grid {
             perturbations: Vec::new(),
             ..Preset::Smoke.grid()?
-        },
-    };
+        };
+        return Ok(vec![changed(plain, args)?]);
+    }
+    let presets = args.preset.iter().map(|name| Preset::by_name(name)?.grid());
+    presets.map(|grid| changed(grid?, args)).collect()
+}
+
+/// A grid with what the options say of it.
+fn changed(mut grid: Grid, args: &Args) -> Result<Grid, SimError> {
     let replace = |slot: &mut Vec<String>, given: &[String]| {
         if !given.is_empty() {
             *slot = given.to_vec();
@@ -262,7 +291,7 @@ mod tests {
 
     fn parse(line: &str) -> Result<Grid, SimError> {
         let words = std::iter::once("eval").chain(line.split_whitespace());
-        grid(&Line::try_parse_from(words).unwrap().args)
+        Ok(grids(&Line::try_parse_from(words).unwrap().args)?.remove(0))
     }
 
     #[test]
@@ -271,6 +300,18 @@ mod tests {
         assert_eq!(grid.suites, ["object"]);
         assert_eq!((grid.seeds.as_slice(), grid.episodes), (&[7, 11][..], 3));
         assert_eq!(grid.perturbations.len(), 6, "the preset's own");
+        let words = [
+            "eval",
+            "--preset",
+            "main,harm",
+            "--seeds",
+            "1000",
+            "--out",
+            "x",
+        ];
+        let two = grids(&Line::try_parse_from(words).unwrap().args).unwrap();
+        assert_eq!((two.len(), two[1].backbones.len()), (2, 4));
+        assert!(two.iter().all(|grid| grid.seeds == [1000]));
         let line = "--suite object --perturbation pos --displace 0.05,0.1 --config base --out x";
         let grid = parse(line).unwrap();
         assert_eq!(

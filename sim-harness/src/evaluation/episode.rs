@@ -3,7 +3,7 @@
 use super::config::{Knowledge, params_for};
 use super::corrections::Corrections;
 use super::grid::EpisodeSpec;
-use super::record::{CORE_VERSION, EpisodeRecord, SCHEMA};
+use super::record::{EpisodeRecord, SCHEMA, build_of};
 use super::witness::{Controlled, Witness};
 use crate::agents::{Agents, OracleAgents};
 use crate::alone::{Alone, AloneSetup, SETTLE_STEPS};
@@ -63,7 +63,7 @@ pub fn play(spec: &EpisodeSpec) -> Result<EpisodeRecord, SimError> {
 /// # Errors
 /// As for [`play`].
 pub fn play_watched(spec: &EpisodeSpec, watch: &mut dyn Watch) -> Result<EpisodeRecord, SimError> {
-    let suite = Suite::embedded(&spec.suite)?;
+    let suite = Suite::open(&spec.suite)?;
     let registry = Registry::embedded()?;
     let index = suite.task_index(&spec.task)?;
     let draw = spec.draw_seed();
@@ -107,7 +107,7 @@ pub fn play_watched(spec: &EpisodeSpec, watch: &mut dyn Watch) -> Result<Episode
     parts.finish();
     Ok(EpisodeRecord {
         schema: SCHEMA,
-        core: CORE_VERSION.to_owned(),
+        core: build_of(&suite),
         suite: spec.suite.clone(),
         task_index: u32::try_from(index).unwrap_or(u32::MAX),
         task: spec.task.clone(),

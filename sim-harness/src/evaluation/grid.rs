@@ -1,9 +1,12 @@
 //! The grid of episodes and its shares.
 
+use std::collections::HashMap;
+
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
 use super::config::{Config, Knowledge, Profile, Vision};
+use super::record::build_of;
 use crate::backbone::Registry;
 use crate::error::SimError;
 use crate::perturb::{Level, Perturbation};
@@ -12,7 +15,7 @@ use crate::suite::Suite;
 /// One episode, described completely.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EpisodeSpec {
-    /// Suite.
+    /// Suite: an embedded one by name, or a file.
     pub suite: String,
     /// Task within it.
     pub task: String,
@@ -112,7 +115,7 @@ impl Shard {
 /// The values that a grid is the product of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
-    /// Suites.
+    /// Suites: embedded ones by name, or files whose names end in `.toml`.
     pub suites: Vec<String>,
     /// Tasks by name; empty for all.
     pub tasks: Vec<String>,
@@ -147,12 +150,24 @@ impl Grid {
         }
         let mut specs = Vec::new();
         for suite_name in &self.suites {
-            let suite = Suite::embedded(suite_name)?;
+            let suite = Suite::open(suite_name)?;
             for task in self.tasks_of(&suite)? {
-                self.add_task(&suite, &task, &mut specs);
+                self.add_task(suite_name, &task, &mut specs);
             }
         }
         Ok(specs)
+    }
+
+    /// What plays the episodes now, by suite: the program's build, and the version of a suite that
+    /// comes from a file.
+    ///
+    /// # Errors
+    /// As for [`Suite::open`].
+    pub fn builds(&self) -> Result<HashMap<String, String>, SimError> {
+        self.suites
+            .iter()
+            .map(|name| Ok((name.clone(), build_of(&Suite::open(name)?))))
+            .collect()
     }
 
     fn tasks_of(&self, suite: &Suite) -> Result<Vec<String>, SimError> {
@@ -173,14 +188,14 @@ impl Grid {
         Ok(own)
     }
 
-    fn add_task(&self, suite: &Suite, task: &str, specs: &mut Vec<EpisodeSpec>) {
+    fn add_task(&self, suite: &str, task: &str, specs: &mut Vec<EpisodeSpec>) {
         for &(perturbation, level) in &self.perturbations {
             for backbone in &self.backbones {
                 for controller in self.controllers() {
                     let (config, profile, vision, knowledge) = controller;
                     for &seed in &self.seeds {
                         specs.extend((0..self.episodes).map(|episode| EpisodeSpec {
-                            suite: suite.name.clone(),
+                            suite: suite.to_owned(),
                             task: task.to_owned(),
                             perturbation,
                             level,

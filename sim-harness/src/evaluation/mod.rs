@@ -20,4 +20,4 @@ pub use grid::{EpisodeSpec, Grid, Shard};
 pub use preset::{PAPER_SEEDS, Preset, TUNING_SEEDS};
 pub use record::{Activation, CORE_VERSION, Ending, EpisodeRecord, Failure, Routine, SCHEMA};
 pub use runner::{Progress, Summary, run};
-pub use store::Store;
+pub use store::{Destination, Store};

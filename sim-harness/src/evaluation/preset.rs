@@ -17,14 +17,19 @@ pub enum Preset {
     Main,
     /// Tables 5 and 6: three backbones.
     Backbones,
-    /// Tables 3, 9 and 10: what each module is worth.
+    /// Tables 3, 9 and 10: what each module is worth to the main backbone.
     Ablation,
-    /// Tables 4 and 11 to 18: four parameters.
+    /// Tables 9 and 10, the other backbone, with half of the paper's episodes.
+    AblationPi05,
+    /// Tables 4 and 11 to 18: four parameters, with half of the paper's episodes.
     Sweeps,
     /// Tables 7 and 8: five seeds.
     Seeds,
-    /// Ours: nominal scenes, all backbones, both profiles, and what the controller costs there.
+    /// Ours: nominal scenes and perturbed ones, all backbones and one that is always right, and
+    /// what the controller costs them.
     Harm,
+    /// Ours: the same with the parameters as published, with half of the episodes.
+    Contrast,
     /// Ours: how far a target can be displaced before the policy alone loses it.
     Displacement,
     /// A few episodes of everything, to see that it works.
@@ -33,6 +38,17 @@ pub enum Preset {
 
 /// The surrogates that stand for the paper's backbones.
 const BACKBONES: [&str; 3] = ["openvla-like", "pi0-like", "pi05-like"];
+/// The paper's ablations.
+const ABLATION: [&str; 6] = [
+    "base",
+    "full",
+    "wo-target",
+    "wo-execution",
+    "wo-hard-pick",
+    "wo-hard-place",
+];
+/// Episodes a task where half of the paper's ten are enough for what is asked.
+const HALF: u32 = 5;
 /// The paper's sweeps: parameter and values, the default left out.
 const SWEEPS: [(&str, &[&str]); 4] = [
     ("gate.failure_streak", &["2", "4"]),
@@ -42,15 +58,17 @@ const SWEEPS: [(&str, &[&str]); 4] = [
 ];
 
 impl Preset {
-    /// All of them.
-    pub const ALL: [Self; 8] = [
+    /// All of them, what matters most first.
+    pub const ALL: [Self; 10] = [
         Self::Main,
+        Self::Harm,
         Self::Backbones,
         Self::Ablation,
-        Self::Sweeps,
         Self::Seeds,
-        Self::Harm,
+        Self::Sweeps,
+        Self::Contrast,
         Self::Displacement,
+        Self::AblationPi05,
         Self::Smoke,
     ];
 
@@ -61,9 +79,11 @@ impl Preset {
             Self::Main => "main",
             Self::Backbones => "backbones",
             Self::Ablation => "ablation",
+            Self::AblationPi05 => "ablation-pi05",
             Self::Sweeps => "sweeps",
             Self::Seeds => "seeds",
             Self::Harm => "harm",
+            Self::Contrast => "contrast",
             Self::Displacement => "displacement",
             Self::Smoke => "smoke",
         }
@@ -120,15 +140,13 @@ impl Preset {
                 ..usual
             },
             Self::Ablation => Grid {
-                configs: configs(&[
-                    "base",
-                    "full",
-                    "wo-target",
-                    "wo-execution",
-                    "wo-hard-pick",
-                    "wo-hard-place",
-                ])?,
-                backbones: owned(&[BACKBONES[0], BACKBONES[2]]),
+                configs: configs(&ABLATION)?,
+                ..usual
+            },
+            Self::AblationPi05 => Grid {
+                configs: configs(&ABLATION)?,
+                backbones: owned(&BACKBONES[2..]),
+                episodes: HALF,
                 ..usual
             },
             Self::Sweeps => {
@@ -140,17 +158,25 @@ impl Preset {
                 }
                 Grid {
                     configs: swept,
+                    episodes: HALF,
                     ..usual
                 }
             }
             Self::Seeds => Grid {
+                configs: configs(&["full"])?,
                 seeds: PAPER_SEEDS.to_vec(),
                 ..usual
             },
             Self::Harm => Grid {
                 perturbations: [nominal, five()].concat(),
                 backbones: owned(&[&BACKBONES[..], &["oracle"]].concat()),
-                profiles: Profile::ALL.to_vec(),
+                ..usual
+            },
+            Self::Contrast => Grid {
+                perturbations: [nominal, five()].concat(),
+                backbones: owned(&BACKBONES),
+                profiles: vec![Profile::Paper],
+                episodes: HALF,
                 ..usual
             },
             Self::Displacement => {
@@ -159,6 +185,7 @@ impl Preset {
                 Grid {
                     suites: owned(&["object"]),
                     perturbations: [nominal, levels.to_vec()].concat(),
+                    episodes: HALF,
                     ..usual
                 }
             }
@@ -174,7 +201,10 @@ impl Preset {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::HashSet;
+
     use super::*;
+    use crate::evaluation::EpisodeSpec;
 
     #[test]
     fn presets_have_the_papers_numbers_of_episodes() {
@@ -182,9 +212,27 @@ mod tests {
         // Suites, tasks, cells, episodes, configurations.
         assert_eq!(count(Preset::Main), 2 * 10 * 6 * 50 * 2);
         assert_eq!(count(Preset::Backbones), 2 * 10 * 5 * 10 * 2 * 3);
-        assert_eq!(count(Preset::Ablation), 2 * 10 * 5 * 10 * 6 * 2);
-        assert_eq!(count(Preset::Sweeps), 2 * 10 * 5 * 10 * 10);
-        assert_eq!(count(Preset::Seeds), 2 * 10 * 5 * 10 * 2 * 5);
+        assert_eq!(count(Preset::Ablation), 2 * 10 * 5 * 10 * 6);
+        assert_eq!(count(Preset::Seeds), 2 * 10 * 5 * 10 * 5);
+        // Half of them.
+        assert_eq!(count(Preset::AblationPi05), 2 * 10 * 5 * 5 * 6);
+        assert_eq!(count(Preset::Sweeps), 2 * 10 * 5 * 5 * 10);
+    }
+
+    #[test]
+    fn presets_share_episodes() {
+        let keys = |preset: Preset| -> HashSet<String> {
+            let specs = preset.grid().unwrap().episodes().unwrap();
+            specs.iter().map(EpisodeSpec::key).collect()
+        };
+        let main = keys(Preset::Main);
+        let apart = |preset| keys(preset).difference(&main).count();
+        assert_eq!(apart(Preset::Backbones), 2 * 10 * 5 * 10 * 2 * 2);
+        assert_eq!(apart(Preset::Ablation), 2 * 10 * 5 * 10 * 4);
+        assert_eq!(apart(Preset::Seeds), 2 * 10 * 5 * 10 * 4);
+        assert_eq!(apart(Preset::Sweeps), 2 * 10 * 5 * 5 * 9);
+        let everything: HashSet<String> = Preset::ALL[..9].iter().flat_map(|p| keys(*p)).collect();
+        assert!(everything.len() < 40_000, "{}", everything.len());
     }
 
     #[test]

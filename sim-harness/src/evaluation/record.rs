@@ -7,11 +7,27 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::suite::Suite;
+
 /// Version of this format. It changes when a field changes its name or meaning.
 pub const SCHEMA: u32 = 1;
 
-/// Version of the controller that played.
-pub const CORE_VERSION: &str = env!("CARGO_PKG_VERSION");
+/// What played: the version, and the first twelve hexadecimal digits of the SHA-256 of the sources,
+/// data and dependencies that decide how an episode goes (core, kinematics, agents and harness).
+pub const CORE_VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    "+",
+    env!("SIM_HARNESS_FINGERPRINT")
+);
+
+/// What plays the episodes of a suite: [`CORE_VERSION`], and the fingerprint of a suite that is not
+/// built in.
+pub(super) fn build_of(suite: &Suite) -> String {
+    match suite.fingerprint() {
+        Some(file) => format!("{CORE_VERSION}/{file}"),
+        None => CORE_VERSION.to_owned(),
+    }
+}
 
 macro_rules! names {
     ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $text:literal,)+ }) => {
@@ -124,9 +140,9 @@ impl Activation {
 pub struct EpisodeRecord {
     /// [`SCHEMA`].
     pub schema: u32,
-    /// [`CORE_VERSION`].
+    /// [`CORE_VERSION`]; with a suite from a file, a slash and that file's fingerprint follow.
     pub core: String,
-    /// Suite: `object` or `spatial`.
+    /// Suite: `object`, `spatial`, or a file.
     pub suite: String,
     /// Number of the task within the suite, from 0.
     pub task_index: u32,

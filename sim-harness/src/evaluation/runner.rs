@@ -1,6 +1,6 @@
 //! Runs a grid on all cores.
 
-use std::path::Path;
+use std::collections::{HashMap, HashSet};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::episode::play;
 use super::grid::{EpisodeSpec, Grid, Shard};
 use super::record::EpisodeRecord;
-use super::store::Store;
+use super::store::{Destination, Store};
 use crate::error::SimError;
 
 /// What has happened so far, for a progress display.
@@ -40,29 +40,43 @@ pub struct Summary {
     pub stopped: bool,
 }
 
-/// Runs what is missing of a shard, on `jobs` threads (0 for all cores), into `folder`.
+/// Runs what is missing of a shard of some grids, in their order, on `jobs` threads (0 for all
+/// cores). What grids have in common is played once.
 ///
 /// `stop` is looked at before each episode; what runs is finished and kept.
 ///
 /// # Errors
 /// The first error of an episode or of the file; whatever was finished is kept.
 pub fn run(
-    grid: &Grid,
-    shard: Shard,
-    folder: &Path,
+    grids: &[Grid],
+    destination: &Destination<'_>,
     jobs: usize,
     stop: &AtomicBool,
     progress: &(dyn Fn(Progress<'_>) + Sync),
 ) -> Result<Summary, SimError> {
-    let all = grid.episodes()?;
+    let Shard { index, count } = destination.shard;
+    let mut builds = HashMap::new();
+    let mut all = Vec::new();
+    let mut known = HashSet::new();
+    for grid in grids {
+        builds.extend(grid.builds()?);
+        let specs = grid.episodes()?.into_iter();
+        all.extend(specs.filter(|spec| known.insert(spec.key())));
+    }
     let share: Vec<EpisodeSpec> = all
         .into_iter()
         .enumerate()
-        .filter(|(i, _)| *i % shard.count as usize == shard.index as usize)
+        .filter(|(i, _)| *i % count as usize == index as usize)
         .map(|(_, spec)| spec)
         .collect();
-    let store = Store::open(folder, shard)?;
-    let missing: Vec<&EpisodeSpec> = share.iter().filter(|spec| !store.has(spec)).collect();
+    let store = Store::open(destination)?;
+    let mut missing = Vec::new();
+    for spec in &share {
+        let build = builds.get(&spec.suite).map_or("", String::as_str);
+        if !store.has(spec, build)? {
+            missing.push(spec);
+        }
+    }
     let total = share.len();
     let found = total - missing.len();
     progress(Progress {
@@ -88,7 +102,8 @@ pub fn run(
             )
         })?;
     let ran = pool.install(|| {
-        missing.par_iter().try_for_each(|spec| {
+        // In order: what matters most stands first, and a run may be ended early.
+        missing.iter().par_bridge().try_for_each(|spec| {
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }

@@ -1,34 +1,76 @@
 //! Results on disk: one line of JSON an episode, appended as they come.
 //!
 //! A kill in the middle loses at most the line that was being written: a half line at the end is
-//! cut off when the file is opened again.
+//! cut off when the file is opened again. Results of another build of the program are not mixed
+//! with those of this one, and two programs never write the same file.
 
-use std::collections::HashSet;
-use std::fs::{File, OpenOptions};
+use std::collections::{HashMap, HashSet};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use super::grid::{EpisodeSpec, Shard};
-use super::record::EpisodeRecord;
+use super::record::{CORE_VERSION, EpisodeRecord};
 use crate::error::SimError;
+
+/// Where results go, and which ones count as there already.
+#[derive(Clone, Copy, Debug)]
+pub struct Destination<'a> {
+    /// The folder. Every `*.jsonl` in it is looked through for episodes.
+    pub folder: &'a Path,
+    /// The share that is run; it has a file of its own.
+    pub shard: Shard,
+    /// Other builds whose episodes count as played, as they stand in the field `core`: for changes
+    /// that are known to decide nothing.
+    pub accepted_builds: &'a [String],
+}
+
+impl<'a> Destination<'a> {
+    /// A whole grid, played by this build only.
+    #[must_use]
+    pub fn whole(folder: &'a Path) -> Self {
+        Self {
+            folder,
+            shard: Shard::WHOLE,
+            accepted_builds: &[],
+        }
+    }
+}
 
 /// A file of results that grows.
 #[derive(Debug)]
 pub struct Store {
     path: PathBuf,
     file: File,
-    done: HashSet<String>,
+    /// The build that played, by the key of the episode.
+    done: HashMap<String, String>,
+    accepted: Vec<String>,
+    /// Held as long as the file may be written.
+    _lock: File,
 }
 
 impl Store {
-    /// Opens or makes the file of a shard in a folder, and reads which episodes it already has.
+    /// Opens or makes the file of a shard in a folder, and reads which episodes the folder
+    /// already has.
     ///
     /// # Errors
-    /// [`SimError::Io`] if the folder or file can't be made or read, [`SimError::Data`] if the
-    /// file holds something else than episodes.
-    pub fn open(folder: &Path, shard: Shard) -> Result<Self, SimError> {
+    /// [`SimError::Io`] if the folder or file can't be made or read, [`SimError::Data`] if a file
+    /// holds something else than episodes, [`SimError::OtherBuild`] if another build played them,
+    /// [`SimError::Busy`] if another program writes there.
+    pub fn open(destination: &Destination<'_>) -> Result<Self, SimError> {
+        let Destination {
+            folder,
+            shard,
+            accepted_builds,
+        } = *destination;
         std::fs::create_dir_all(folder).map_err(|e| SimError::io(folder, e))?;
         let path = folder.join(format!("episodes-{}-of-{}.jsonl", shard.index, shard.count));
+        let lock = lock(&path.with_extension("lock"))?;
+        let mut done = HashMap::new();
+        for other in results_in(folder)?.iter().filter(|other| **other != path) {
+            let text = std::fs::read_to_string(other).map_err(|e| SimError::io(other, e))?;
+            note(&mut done, other, whole_lines(&text), accepted_builds)?;
+        }
         let mut file = OpenOptions::new()
             .read(true)
             .write(true)
@@ -39,16 +81,21 @@ impl Store {
         let mut text = String::new();
         file.read_to_string(&mut text)
             .map_err(|e| SimError::io(&path, e))?;
-        let whole = text.rfind('\n').map_or(0, |end| end + 1);
-        if whole < text.len() {
-            file.set_len(whole as u64)
+        let whole = whole_lines(&text);
+        note(&mut done, &path, whole, accepted_builds)?;
+        if whole.len() < text.len() {
+            file.set_len(whole.len() as u64)
                 .map_err(|e| SimError::io(&path, e))?;
         }
         file.seek(SeekFrom::End(0))
             .map_err(|e| SimError::io(&path, e))?;
-        let records = parse(&path, &text[..whole])?;
-        let done = records.iter().map(EpisodeRecord::key).collect();
-        Ok(Self { path, file, done })
+        Ok(Self {
+            path,
+            file,
+            done,
+            accepted: accepted_builds.to_vec(),
+            _lock: lock,
+        })
     }
 
     /// The file.
@@ -57,17 +104,26 @@ impl Store {
         &self.path
     }
 
-    /// Whether an episode is already there.
-    #[must_use]
-    pub fn has(&self, spec: &EpisodeSpec) -> bool {
-        self.done.contains(&spec.key())
+    /// Whether an episode is already there; `build` is what would play it now.
+    ///
+    /// # Errors
+    /// [`SimError::OtherBuild`] if it was played on another version of a suite's file.
+    pub fn has(&self, spec: &EpisodeSpec, build: &str) -> Result<bool, SimError> {
+        let Some(found) = self.done.get(&spec.key()) else {
+            return Ok(false);
+        };
+        if suite_file(found) == suite_file(build) || self.accepted.contains(found) {
+            Ok(true)
+        } else {
+            Err(other_build(&self.path, found, build))
+        }
     }
 
     /// Adds an episode; it is on its way to the disk when this returns.
     ///
     /// # Errors
     /// [`SimError::Io`] if it can't be written, for example on a full disk. Nothing that was
-    /// written before is lost.
+    /// written before is lost, and later ones can be added once there is room.
     pub fn append(&mut self, record: &EpisodeRecord) -> Result<(), SimError> {
         let mut line = line_of(record)?;
         line.push('\n');
@@ -78,9 +134,10 @@ impl Store {
         if let Err(error) = self.file.write_all(line.as_bytes()) {
             // Half a line would be cut off by the next run; better not to leave it at all.
             let _ = self.file.set_len(end);
+            let _ = self.file.seek(SeekFrom::Start(end));
             return Err(SimError::io(&self.path, error));
         }
-        self.done.insert(record.key());
+        self.done.insert(record.key(), record.core.clone());
         Ok(())
     }
 
@@ -97,7 +154,7 @@ impl Store {
         self.file
             .read_to_string(&mut text)
             .map_err(|e| SimError::io(&self.path, e))?;
-        let place: std::collections::HashMap<String, usize> = order
+        let place: HashMap<String, usize> = order
             .iter()
             .enumerate()
             .map(|(i, spec)| (spec.key(), i))
@@ -111,8 +168,10 @@ impl Store {
             sorted.push('\n');
         }
         let fresh = self.path.with_extension("jsonl.new");
-        std::fs::write(&fresh, sorted).map_err(|e| SimError::io(&fresh, e))?;
-        std::fs::rename(&fresh, &self.path).map_err(|e| SimError::io(&self.path, e))
+        replace(&self.path, &fresh, sorted.as_bytes()).map_err(|e| {
+            let _ = std::fs::remove_file(&fresh);
+            SimError::io(&fresh, e)
+        })
     }
 
     /// Reads all results of a folder, without those that appear twice.
@@ -120,20 +179,10 @@ impl Store {
     /// # Errors
     /// [`SimError::Io`] or [`SimError::Data`], naming the file.
     pub fn load(folder: &Path) -> Result<Vec<EpisodeRecord>, SimError> {
-        let entries = std::fs::read_dir(folder).map_err(|e| SimError::io(folder, e))?;
-        let mut paths = Vec::new();
-        for entry in entries {
-            let path = entry.map_err(|e| SimError::io(folder, e))?.path();
-            if path.extension().is_some_and(|e| e == "jsonl") {
-                paths.push(path);
-            }
-        }
-        paths.sort();
         let (mut records, mut seen) = (Vec::new(), HashSet::new());
-        for path in paths {
+        for path in results_in(folder)? {
             let text = std::fs::read_to_string(&path).map_err(|e| SimError::io(&path, e))?;
-            let whole = text.rfind('\n').map_or(0, |end| end + 1);
-            for record in parse(&path, &text[..whole])? {
+            for record in parse(&path, whole_lines(&text))? {
                 if seen.insert(record.key()) {
                     records.push(record);
                 }
@@ -141,6 +190,83 @@ impl Store {
         }
         Ok(records)
     }
+}
+
+/// Takes a lock for as long as the file is open.
+fn lock(path: &Path) -> Result<File, SimError> {
+    let file = OpenOptions::new()
+        .write(true)
+        .create(true)
+        .truncate(false)
+        .open(path)
+        .map_err(|e| SimError::io(path, e))?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(SimError::Busy {
+            path: path.display().to_string(),
+        }),
+        Err(TryLockError::Error(e)) => Err(SimError::io(path, e)),
+    }
+}
+
+/// The files of results in a folder, sorted.
+fn results_in(folder: &Path) -> Result<Vec<PathBuf>, SimError> {
+    let mut paths = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(|e| SimError::io(folder, e))? {
+        let path = entry.map_err(|e| SimError::io(folder, e))?.path();
+        if path.extension().is_some_and(|e| e == "jsonl") {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    Ok(paths)
+}
+
+/// The text without a half line at the end.
+fn whole_lines(text: &str) -> &str {
+    &text[..text.rfind('\n').map_or(0, |end| end + 1)]
+}
+
+/// Notes who played the episodes of a file.
+fn note(
+    done: &mut HashMap<String, String>,
+    path: &Path,
+    text: &str,
+    accepted: &[String],
+) -> Result<(), SimError> {
+    for record in parse(path, text)? {
+        if program(&record.core) != CORE_VERSION && !accepted.contains(&record.core) {
+            return Err(other_build(path, &record.core, CORE_VERSION));
+        }
+        done.insert(record.key(), record.core);
+    }
+    Ok(())
+}
+
+/// The program's part of a build.
+fn program(build: &str) -> &str {
+    build.split_once('/').map_or(build, |(program, _)| program)
+}
+
+/// The part of a build that stands for the suite's file.
+fn suite_file(build: &str) -> Option<&str> {
+    build.split_once('/').map(|(_, file)| file)
+}
+
+fn other_build(path: &Path, found: &str, own: &str) -> SimError {
+    SimError::OtherBuild {
+        path: path.display().to_string(),
+        found: found.to_owned(),
+        own: own.to_owned(),
+    }
+}
+
+/// Writes a new file and puts it in the place of the old one, which stays until then.
+fn replace(path: &Path, fresh: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut file = File::create(fresh)?;
+    file.write_all(bytes)?;
+    file.sync_all()?;
+    std::fs::rename(fresh, path)
 }
 
 fn line_of(record: &EpisodeRecord) -> Result<String, SimError> {
@@ -184,9 +310,11 @@ mod tests {
         let path = PathBuf::from("/dev/full");
         let file = OpenOptions::new().write(true).open(&path).unwrap();
         let mut store = Store {
+            _lock: file.try_clone().unwrap(),
             path,
             file,
-            done: HashSet::new(),
+            done: HashMap::new(),
+            accepted: Vec::new(),
         };
         let error = store.append(&record()).unwrap_err().to_string();
         assert!(error.contains("/dev/full"), "{error}");
