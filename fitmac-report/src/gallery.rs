@@ -1,6 +1,6 @@
 //! Pictures of episodes: each is played again, which gives the same episode, before a camera.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use fitmac_core::wire::{Phase, Route};
 use sim_harness::SimError;
@@ -13,7 +13,7 @@ use sim_harness::picture::png_bytes;
 use sim_harness::raster::{Camera, picture};
 use sim_harness::sim::Sim;
 
-use crate::select::BASE;
+use crate::select::{BASE, FULL, MAIN};
 
 /// Size of a frame, px.
 const FRAME_PX: [usize; 2] = [320, 240];
@@ -34,29 +34,44 @@ pub struct Frame {
 /// Pictures by the key of their episode.
 pub type Gallery = BTreeMap<String, Vec<Frame>>;
 
-/// Which episodes are worth pictures, the most telling first, `most` of them: harmed ones, other
-/// failures with the controller, then one of each cell that it saved.
+/// Which episodes are worth pictures, the most telling first, `most` of them: what the whole
+/// controller in its own profile harmed, what else failed with it, and one of each cell that it
+/// saved; then the same of other settings. Of each, one of every kind comes before the second of
+/// any, and the main surrogate before others.
 #[must_use]
 pub fn choose(records: &[EpisodeRecord], most: usize) -> Vec<&EpisodeRecord> {
-    let alone: BTreeMap<String, bool> = records
+    let alone: HashMap<String, bool> = records
         .iter()
         .filter(|r| r.config == BASE)
         .map(|r| (r.pair_key(), r.success))
         .collect();
-    let with = || records.iter().filter(|r| r.config != BASE);
-    let wins = |r: &EpisodeRecord| alone.get(&r.pair_key()).copied();
-    let harmed = with().filter(|r| !r.success && wins(r) == Some(true));
-    let failed = with().filter(|r| !r.success && wins(r) != Some(true));
-    let mut saved: BTreeMap<_, &EpisodeRecord> = BTreeMap::new();
-    for record in with().filter(|r| r.success && wins(r) == Some(false)) {
-        let cell = (&record.suite, &record.perturbation, &record.backbone);
-        saved.entry(cell).or_insert(record);
+    let mut seen: HashMap<_, usize> = HashMap::new();
+    let mut ranked = Vec::new();
+    for record in records.iter().filter(|r| r.config != BASE) {
+        let own = record.config == FULL && record.profile == Profile::Guarded.name();
+        let tier = match (record.success, alone.get(&record.pair_key())) {
+            (false, Some(true)) => 0,
+            (false, _) => 1,
+            (true, Some(false)) => 2,
+            (true, _) => continue,
+        };
+        let task = (tier < 2).then_some(&record.task);
+        let kind = (
+            own,
+            tier,
+            (&record.suite, &record.perturbation, &record.backbone),
+            task,
+            record.failure,
+        );
+        let nth = seen.entry(kind).or_default();
+        *nth += 1;
+        if tier < 2 || *nth == 1 {
+            ranked.push(((!own, tier, *nth, record.backbone != MAIN), record));
+        }
     }
-    harmed
-        .chain(failed)
-        .chain(saved.into_values())
-        .take(most)
-        .collect()
+    // Stable: what ranks alike keeps its order.
+    ranked.sort_by_key(|(rank, _)| *rank);
+    ranked.into_iter().map(|(_, r)| r).take(most).collect()
 }
 
 /// Plays an episode again and takes pictures of it.
@@ -66,7 +81,11 @@ pub fn choose(records: &[EpisodeRecord], most: usize) -> Vec<&EpisodeRecord> {
 /// recorded, which says that the record is of another version.
 pub fn film(record: &EpisodeRecord) -> Result<Vec<Frame>, SimError> {
     let mut film = Film::default();
-    let again = play_watched(&spec_of(record)?, &mut film)?;
+    // Another build may play alike: what counts is the episode.
+    let again = EpisodeRecord {
+        core: record.core.clone(),
+        ..play_watched(&spec_of(record)?, &mut film)?
+    };
     if again != *record {
         return Err(SimError::Invalid {
             what: record.key(),

@@ -88,4 +88,27 @@ fn harmed_episodes_come_first() {
     let order: Vec<u32> = choose(&records, 9).iter().map(|r| r.episode).collect();
     assert_eq!(order, [0, 2, 1], "harmed, failed, saved");
     assert_eq!(choose(&records, 1).len(), 1);
+    // An ablation that fails is less telling than what the whole controller does.
+    let ablated = EpisodeRecord {
+        config: "wo-target".to_owned(),
+        ..with(0, false)
+    };
+    let records = [&[ablated][..], &records].concat();
+    let order: Vec<&str> = choose(&records, 9).iter().map(|r| &*r.config).collect();
+    assert_eq!(order, ["full", "full", "full", "wo-target"]);
+}
+
+#[test]
+fn one_of_every_kind_comes_before_the_second_of_any() {
+    let alone = play(&spec("base", Perturbation::None, Level::Standard)).unwrap();
+    let fails = |episode, task: &str| EpisodeRecord {
+        config: "full".to_owned(),
+        task: task.to_owned(),
+        episode,
+        success: false,
+        ..alone.clone()
+    };
+    let records = [fails(0, "milk"), fails(1, "milk"), fails(2, "butter")];
+    let order: Vec<u32> = choose(&records, 9).iter().map(|r| r.episode).collect();
+    assert_eq!(order, [0, 2, 1]);
 }

@@ -13,6 +13,7 @@ use crate::exit::{BadInput, Exit};
   fitmac report out/main --out out/main/report
   fitmac report out/main out/ablation out/sweeps --out out/report
   fitmac report out/main --out out/main/report --pictures 24
+  fitmac report out/main --out out/main/report --pictures 200 --page docs/evaluation.md
 
 Reads every *.jsonl of the folders that `fitmac eval` wrote, and writes report.html
 (one page that needs nothing else), report.md and report.json: the paper's tables
@@ -32,8 +33,12 @@ pub(crate) struct Args {
     /// The folder for the report.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Writes a Markdown page for the documentation, too, its pictures in `pictures/` beside it.
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
     /// Plays up to N episodes again and puts pictures of them into the page: harmed ones first,
-    /// then other failures with FIT-MAC, then some that it saved. A few seconds each.
+    /// then other failures with FIT-MAC, one of each kind before the second of any, then some
+    /// that it saved. A few seconds each.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pictures: usize,
 }
@@ -51,6 +56,11 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Exit> {
     let filmed = film(&mut report, args.pictures)?;
     for path in render::write(&report, &args.out)? {
         println!("{}", path.display());
+    }
+    if let Some(page) = &args.page {
+        for path in render::page(&report, page)? {
+            println!("{}", path.display());
+        }
     }
     Ok(if loaded.problems.is_empty() && filmed {
         Exit::Done

@@ -9,6 +9,17 @@ use crate::table::{Cell, Table};
 #[must_use]
 pub fn markdown(report: &Report) -> String {
     let mut out = String::from("# FIT-MAC evaluation: surrogate policies\n\n");
+    summary(&mut out, report);
+    out.push_str(
+        "\nA cell reads: measured here [Wilson 95 % interval] (the paper's figure, of the model \
+         itself).\n",
+    );
+    tables(&mut out, report);
+    out
+}
+
+/// What was evaluated, and in short what came of it.
+pub(super) fn summary(out: &mut String, report: &Report) {
     let _ = writeln!(out, "{}\n", super::surrogates(report));
     let _ = writeln!(out, "{}\n", super::seeds(report));
     for warning in &report.about.warnings {
@@ -17,13 +28,13 @@ pub fn markdown(report: &Report) -> String {
     for verdict in &report.verdicts {
         let _ = writeln!(out, "- {}: {}", verdict.label, super::sentence(verdict));
     }
-    out.push_str(
-        "\nA cell reads: measured here [Wilson 95 % interval] (the paper's figure, of the model \
-         itself).\n",
-    );
+}
+
+/// All tables, and the lines that could not be used.
+pub(super) fn tables(out: &mut String, report: &Report) {
     for topic in report.tables.chunk_by(|a, b| a.topic == b.topic) {
         let _ = writeln!(out, "\n## {}", topic[0].topic.title());
-        topic.iter().for_each(|table| write_table(&mut out, table));
+        topic.iter().for_each(|table| write_table(out, table));
     }
     if !report.problems.is_empty() {
         out.push_str("\n## Lines that could not be used\n\n");
@@ -35,7 +46,6 @@ pub fn markdown(report: &Report) -> String {
             );
         }
     }
-    out
 }
 
 fn write_table(out: &mut String, table: &Table) {

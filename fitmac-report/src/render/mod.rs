@@ -1,13 +1,15 @@
 //! Writes a report: Markdown for people and pull requests, JSON for programs, one HTML page for
-//! looking around.
+//! looking around, and a page for the documentation.
 
 mod html;
 mod markdown;
+mod page;
 
 use std::path::{Path, PathBuf};
 
 pub use html::html;
 pub use markdown::markdown;
+pub use page::page;
 
 use crate::{Report, ReportError};
 

@@ -5,6 +5,7 @@ mod backbones;
 mod cost;
 mod failures;
 mod main_table;
+mod remaining;
 mod seeds;
 mod sweeps;
 mod timing;
@@ -14,6 +15,7 @@ pub use backbones::backbones;
 pub use cost::{cost, pairs_of};
 pub use failures::failures;
 pub use main_table::main_table;
+pub use remaining::{ceilings, remaining};
 pub use seeds::seeds;
 pub use sweeps::{by_displacement, displacement, sweeps};
 pub use timing::{delays, timing};
@@ -44,6 +46,8 @@ pub fn all(source: Source<'_>) -> Vec<Table> {
         tables.extend(seeds(source, &setting));
         tables.extend(displacement(source, &setting));
         tables.extend(timing(source, &setting));
+        tables.extend(remaining(source, &setting));
+        tables.extend(ceilings(source, &setting));
         tables.extend(failures(source, &setting));
     }
     tables.extend(cost(source));
