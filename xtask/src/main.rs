@@ -74,6 +74,8 @@ enum Command {
     Soak(cmd::soak::Args),
     /// Measure the reaction to every fault against real processes (2 minutes).
     Faults(cmd::faults::Args),
+    /// Play every experiment of the paper and make the report (hours; it goes on where it ended).
+    Evaluate(cmd::evaluate::Args),
     /// Say what the machine lacks to build and test.
     Doctor(cmd::doctor::Args),
 }
@@ -96,6 +98,7 @@ fn main() -> ExitCode {
         Command::Faults(args) => cmd::faults::run(&workspace, &args),
         Command::Swarm(args) => cmd::swarm::run(&workspace, &args),
         Command::Fuzz(args) => cmd::fuzz::run(&workspace, &args),
+        Command::Evaluate(args) => cmd::evaluate::run(&workspace, &args),
         Command::Soak(args) => cmd::soak::run(&workspace, &args),
         Command::Doctor(args) => cmd::doctor::run(&workspace, &args),
     };

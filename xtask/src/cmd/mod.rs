@@ -6,6 +6,7 @@ pub(crate) mod ci;
 pub(crate) mod demo;
 pub(crate) mod docs;
 pub(crate) mod doctor;
+pub(crate) mod evaluate;
 pub(crate) mod faults;
 pub(crate) mod fuzz;
 pub(crate) mod install;
