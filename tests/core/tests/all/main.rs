@@ -2,6 +2,7 @@
 
 mod bytes;
 mod invariants;
+mod quick;
 mod recoveries;
 mod soak;
 mod swarm;
