@@ -2,18 +2,13 @@
 //! libraries, else Debian's, unpacked under `target/bare-metal` and never installed.
 
 use std::{
-    fs,
     path::{Path, PathBuf},
     process::{Command, Stdio},
 };
 
 use anyhow::{Context, bail};
 
-use crate::{
-    cmd::bare_metal::is_installed,
-    process::{self, step},
-    workspace::{Workspace, not_writable},
-};
+use crate::{debian, workspace::Workspace};
 
 /// Debian 12's compiler with the source of its core library.
 const PACKAGES: [&str; 5] = [
@@ -38,7 +33,7 @@ impl Compiler {
         if targets.iter().all(|target| has_target(target)) {
             return Ok(Self::Installed);
         }
-        if !is_installed("apt-get") || !is_installed("dpkg-deb") {
+        if !debian::is_here() {
             bail!(
                 "the compiler has no libraries for {}: run `rustup target add {}` and this again",
                 targets.join(" and "),
@@ -46,7 +41,12 @@ impl Compiler {
             );
         }
         let folder = workspace.root().join("target/bare-metal/debian");
-        unpack_debian(&folder)?;
+        debian::unpack(
+            &folder,
+            &PACKAGES,
+            "Debian's Rust compiler for bare metal, 137 MB",
+        )
+        .context("or `rustup target add` the targets")?;
         Ok(Self::Debian(folder))
     }
 
@@ -88,35 +88,4 @@ fn has_target(target: &str) -> bool {
         let folder = String::from_utf8_lossy(&output.stdout);
         Path::new(folder.trim()).is_dir()
     })
-}
-
-fn unpack_debian(folder: &Path) -> anyhow::Result<()> {
-    let made_from = folder.join("made-from.txt");
-    let wanted = PACKAGES.join("\n");
-    if fs::read_to_string(&made_from).is_ok_and(|made| made == wanted) {
-        return Ok(());
-    }
-    step("Fetching Debian's Rust compiler for bare metal (once, 137 MB; nothing is installed)");
-    let packages = folder.with_extension("packages");
-    for place in [folder, &packages] {
-        if place.exists() {
-            fs::remove_dir_all(place).map_err(|error| not_writable(place, &error))?;
-        }
-        fs::create_dir_all(place).map_err(|error| not_writable(place, &error))?;
-    }
-    let mut apt = Command::new("apt-get");
-    apt.args(["download", "--quiet"]).args(PACKAGES);
-    apt.current_dir(&packages).stdout(process::to_stderr());
-    process::run(&mut apt).context(
-        "Debian 12's packages could not be fetched: run `apt-get update` and this again, or \
-         `rustup target add` the targets",
-    )?;
-    let entries = fs::read_dir(&packages).map_err(|error| not_writable(&packages, &error))?;
-    for entry in entries {
-        let package = entry.context("reading the fetched packages")?.path();
-        let mut dpkg = Command::new("dpkg-deb");
-        process::run(dpkg.arg("--extract").arg(package).arg(folder))?;
-    }
-    fs::remove_dir_all(&packages).map_err(|error| not_writable(&packages, &error))?;
-    fs::write(&made_from, wanted).map_err(|error| not_writable(&made_from, &error))
 }

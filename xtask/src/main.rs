@@ -3,15 +3,20 @@
 //! One file a command in [`cmd`]. What the commands share: where things are
 //! ([`workspace`]), Python ([`python`]), MuJoCo's library ([`mujoco`]), the
 //! environment of the test oracles ([`oracles`]), a compiler for bare metal
-//! ([`bare_rust`]), the ticks that tools watch ([`ticks`]) and child processes ([`process`]).
+//! ([`bare_rust`]), Debian's packages ([`debian`]), cargo's tools ([`tool`]), the ticks that tools
+//! watch ([`ticks`]), lists of exceptions with their reasons ([`lists`]) and child processes
+//! ([`process`]).
 
 mod bare_rust;
 mod cmd;
+mod debian;
+mod lists;
 mod mujoco;
 mod oracles;
 mod process;
 mod python;
 mod ticks;
+mod tool;
 mod workspace;
 
 use std::{path::PathBuf, process::ExitCode};
@@ -72,6 +77,10 @@ enum Command {
     Fuzz(cmd::fuzz::Args),
     /// Compare the core with a second one, tick by tick (10 million ticks: two minutes).
     Soak(cmd::soak::Args),
+    /// Change the core in every small way and see that a test notices (hours; resumable).
+    Mutants(cmd::mutants::Args),
+    /// Say which lines of the core no test reaches (minutes).
+    Coverage(cmd::coverage::Args),
     /// Measure the reaction to every fault against real processes (2 minutes).
     Faults(cmd::faults::Args),
     /// Play every experiment of the paper and make the report (hours; it goes on where it ended).
@@ -99,6 +108,8 @@ fn main() -> ExitCode {
         Command::Swarm(args) => cmd::swarm::run(&workspace, &args),
         Command::Fuzz(args) => cmd::fuzz::run(&workspace, &args),
         Command::Evaluate(args) => cmd::evaluate::run(&workspace, &args),
+        Command::Mutants(args) => cmd::mutants::run(&workspace, &args),
+        Command::Coverage(args) => cmd::coverage::run(&workspace, &args),
         Command::Soak(args) => cmd::soak::run(&workspace, &args),
         Command::Doctor(args) => cmd::doctor::run(&workspace, &args),
     };

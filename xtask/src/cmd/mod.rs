@@ -3,6 +3,7 @@
 pub(crate) mod bare_metal;
 pub(crate) mod bench;
 pub(crate) mod ci;
+pub(crate) mod coverage;
 pub(crate) mod demo;
 pub(crate) mod docs;
 pub(crate) mod doctor;
@@ -10,6 +11,7 @@ pub(crate) mod evaluate;
 pub(crate) mod faults;
 pub(crate) mod fuzz;
 pub(crate) mod install;
+pub(crate) mod mutants;
 pub(crate) mod replay_identity;
 pub(crate) mod rtsan;
 pub(crate) mod setup;

@@ -1,0 +1,155 @@
+//! What a mutant is called, and how it is found again once lines have moved.
+
+use std::{fs, path::Path};
+
+use crate::lists::{self, Exception};
+
+/// Where the core's source is.
+pub(super) const SOURCE: &str = "fitmac-core/src/";
+
+/// A mutant as cargo-mutants names it: `fitmac-core/src/gate.rs:26:9: replace ...`.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Mutant {
+    file: String,
+    line: usize,
+    column: usize,
+    change: String,
+}
+
+impl Mutant {
+    /// Reads a name.
+    pub(super) fn parse(name: &str) -> Option<Self> {
+        let (place, change) = name.split_once(": ")?;
+        let mut parts = place.rsplitn(3, ':');
+        let column = parts.next()?.parse().ok()?;
+        let line = parts.next()?.parse().ok()?;
+        Some(Self {
+            file: parts.next()?.to_owned(),
+            line,
+            column,
+            change: change.trim_end().to_owned(),
+        })
+    }
+
+    /// The name again.
+    pub(super) fn name(&self) -> String {
+        let Self {
+            file,
+            line,
+            column,
+            change,
+        } = self;
+        format!("{file}:{line}:{column}: {change}")
+    }
+
+    /// A regular expression that matches just this name.
+    pub(super) fn pattern(&self) -> String {
+        let mut pattern = String::from("^");
+        for c in self.name().chars() {
+            if c.is_ascii_punctuation() {
+                pattern.push('\\');
+            }
+            pattern.push(c);
+        }
+        pattern
+            .replace("\\:", ":")
+            .replace("\\<", "<")
+            .replace("\\>", ">")
+            + "$"
+    }
+
+    /// The file, from the workspace's root.
+    pub(super) fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// The file below the core's source.
+    pub(super) fn short_file(&self) -> &str {
+        short(&self.file)
+    }
+
+    /// It and the text of its line in the checkout.
+    pub(super) fn site(&self, root: &Path) -> Site<'_> {
+        let text = fs::read_to_string(root.join(&self.file)).unwrap_or_default();
+        let line = text.lines().nth(self.line.saturating_sub(1));
+        Site {
+            mutant: self,
+            line: line.unwrap_or_default().trim().to_owned(),
+        }
+    }
+}
+
+/// A file below the core's source.
+pub(super) fn short(file: &str) -> &str {
+    file.strip_prefix(SOURCE).unwrap_or(file)
+}
+
+/// A mutant and the text of its line.
+pub(super) struct Site<'a> {
+    pub(super) mutant: &'a Mutant,
+    line: String,
+}
+
+impl Site<'_> {
+    /// What finds it again.
+    pub(super) fn key(&self) -> Key {
+        Key {
+            line: self.line.clone(),
+            mutant: format!("{}: {}", self.mutant.column, self.mutant.change),
+        }
+    }
+
+    /// Whether this entry of the list is its own.
+    pub(super) fn is_explained_by(&self, entry: &Exception) -> bool {
+        self.key().is(self.mutant.short_file(), entry)
+    }
+
+    /// Its entry without a reason.
+    pub(super) fn draft(&self) -> String {
+        self.key().draft(self.mutant.short_file())
+    }
+}
+
+/// What finds a mutant again in its file: the text of its line, and column and change.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Key {
+    pub(super) line: String,
+    pub(super) mutant: String,
+}
+
+impl Key {
+    /// Whether this entry of the list is its own.
+    pub(super) fn is(&self, short: &str, entry: &Exception) -> bool {
+        entry.is_about(&format!("{SOURCE}{short}"), &self.line, &self.mutant)
+    }
+
+    /// Its entry without a reason.
+    pub(super) fn draft(&self, short: &str) -> String {
+        let file = format!("{SOURCE}{short}");
+        lists::draft(
+            "survivor",
+            &file,
+            &self.line,
+            Some(("mutant", &self.mutant)),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_read_and_written() {
+        let name = "fitmac-core/src/lock.rs:49:9: replace A::b -> Result<(), C> with Ok(())";
+        let mutant = Mutant::parse(name).expect("a name");
+        assert_eq!(mutant.name(), name);
+        assert_eq!(mutant.short_file(), "lock.rs");
+        assert_eq!((mutant.line, mutant.column), (49, 9));
+        assert_eq!(
+            mutant.pattern(),
+            r"^fitmac\-core\/src\/lock\.rs:49:9: replace A::b \-> Result<\(\)\, C> with Ok\(\(\)\)$"
+        );
+        assert_eq!(Mutant::parse("ok"), None);
+    }
+}
