@@ -2,9 +2,10 @@
 //! A failing test prints the table of decisions.
 
 use fitmac_core::{
-    Params,
-    message::TraceRecord,
+    Controller, Params,
+    message::{Input, StateSample, TraceRecord},
     params::Switches,
+    reason,
     wire::{DestinationKind, Diagnosis, Mode, Provenance, Route, SubPhase},
 };
 use fitmac_core_tests::world::{
@@ -328,6 +329,112 @@ fn an_arm_that_freezes_at_a_joint_limit_backs_out() {
         let session = session(params, &scene, Behaviour::Frozen);
         let end = succeeds(profile, session);
         assert!(end.controller.state().episode().correction_queries() > 0);
+    }
+}
+
+/// True while a place is pending that has not let go.
+fn is_carrying(session: &Session) -> bool {
+    let state = session.controller.state();
+    state.subtask().recovery().is_placing() && state.subtask().estimator().is_lifted()
+}
+
+#[test]
+fn an_arm_that_freezes_while_it_carries_backs_out_with_its_hand_closed() {
+    for (profile, params) in profiles() {
+        let scene = Scene::can_to_plate();
+        let mut session = session(params, &scene, Behaviour::Frozen);
+        assert!(session.run_until(STEPS, is_carrying), "{profile}");
+        session.run_until(4, |_| false);
+        let reach = |session: &Session| {
+            let [x, y, _] = session.world.ee_m();
+            x.hypot(y)
+        };
+        // The limit is here now: it neither comes nearer to the plate nor lets go.
+        let limit_m = reach(&session);
+        session.world.plant.reach_m = limit_m;
+        let backed = session.run_until(60, |s| reach(s) < limit_m - 0.02);
+        assert!(backed, "{profile}\n{}", decisions(&session));
+        assert!(is_carrying(&session), "{profile}: it still holds the can");
+        session.world.plant.reach_m = 0.9;
+        succeeds(profile, session);
+    }
+}
+
+#[test]
+fn what_slips_from_a_place_is_left_where_no_pick_may_follow() {
+    for (profile, mut params) in profiles() {
+        params.switches.hard_pick = false;
+        let scene = Scene::can_to_plate();
+        let mut session = session(params, &scene, Behaviour::MissesPlace([0.12, 0.0]));
+        if !session.run_until(STEPS, is_carrying) {
+            // Without a monitor of the destination nothing is noticed before it is let go.
+            assert_eq!(profile, "paper");
+            continue;
+        }
+        // It slips, and the fingers meet.
+        session.world.plant.weak_grasps = 1;
+        session.world.plant.drop_above_m = Some(0.0);
+        let ended = session.run_until(20, |s| {
+            !s.controller.state().subtask().recovery().is_pending()
+        });
+        assert!(ended, "{profile}: no pick follows\n{}", decisions(&session));
+        let reasons = session.controller.state().decision().reasons;
+        assert_ne!(reasons & reason::VALIDITY_LOST, 0, "{profile}");
+    }
+}
+
+/// Runs with poses that are renewed every `period` ticks and are `delay` ticks old when they come.
+/// True if the task was done.
+fn with_poses(scene: &Scene, behaviour: Behaviour, period: usize, delay: usize) -> bool {
+    let params = Params::guarded().validate().expect("the profile is valid");
+    let mut controller = Controller::new(params);
+    let mut world = scene.world.clone();
+    let mut policy = Policy::new(behaviour);
+    let mut agent = Agent::knowing(scene);
+    let mut seen: Vec<StateSample> = Vec::new();
+    for tick in 0..5000_usize {
+        world.advance(4_000_000);
+        let now_ns = world.now_ns();
+        let mut sample = world.sample();
+        seen.push(sample);
+        let from = tick.saturating_sub(delay);
+        sample.objects = seen[from - from % period].objects;
+        let (chunk, grounding) = (policy.poll(now_ns), agent.poll(now_ns));
+        let output = controller.tick(
+            now_ns,
+            &Input {
+                state: Some(&sample),
+                chunk: chunk.as_ref(),
+                grounding: grounding.as_ref(),
+                ..Input::default()
+            },
+        );
+        world.apply(&output.command);
+        if let Some(query) = &output.query {
+            policy.ask(query, &world, scene);
+        }
+        if let Some(request) = &output.rebind {
+            agent.ask(now_ns, request, scene);
+        }
+        if scene.is_done(&world) {
+            return true;
+        }
+    }
+    false
+}
+
+#[test]
+fn poses_that_come_seldom_or_late_are_enough() {
+    for scene in [Scene::can_to_plate(), Scene::can_to_basket()] {
+        for behaviour in [Behaviour::Frozen, Behaviour::StallsAbove(0.05)] {
+            for (period, delay) in [(1, 0), (20, 0), (1, 15), (20, 5), (15, 40)] {
+                let done = with_poses(&scene, behaviour.clone(), period, delay);
+                assert!(
+                    done,
+                    "{behaviour:?}, every {period} ticks, {delay} ticks late"
+                );
+            }
+        }
     }
 }
 
