@@ -72,7 +72,8 @@ pub(crate) fn run(workspace: &Workspace, args: &Args) -> anyhow::Result<()> {
     fuzz.args([&found, &kept])
         .arg(format!("-max_total_time={seconds}"))
         .arg(format!("-artifact_prefix={}/", findings.display()))
-        .args([MAX_LEN, "-timeout=60", "-print_final_stats=1"]);
+        // By the clock: on a busy machine a process may stand still for minutes.
+        .args([MAX_LEN, "-timeout=600", "-print_final_stats=1"]);
     process::run(&mut fuzz).with_context(|| {
         format!(
             "a finding: `cargo xtask fuzz FILE` shows it again; the files are in {}",
