@@ -1,6 +1,7 @@
 //! Which episodes a cell is made of.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use serde::Serialize;
 use sim_harness::evaluation::{EpisodeRecord, PAPER_SEEDS, TUNING_SEEDS};
@@ -117,6 +118,17 @@ impl Rates {
     }
 }
 
+/// What the starts and the noise of an episode are drawn from, within a suite.
+type Draw<'a> = (&'a str, u64, u32);
+
+fn draw_of(record: &EpisodeRecord) -> Draw<'_> {
+    (&record.task, record.seed, record.episode)
+}
+
+fn cell_of(record: &EpisodeRecord) -> (&str, &str) {
+    (&record.suite, &record.perturbation)
+}
+
 /// The episodes that a report is about: those of one class of seeds.
 #[derive(Clone, Debug)]
 pub struct Episodes<'a> {
@@ -213,6 +225,38 @@ impl<'a> Episodes<'a> {
             .filter(|r| r.level == STANDARD && r.backbone == backbone && r.config == config)
             .filter(|r| r.config == BASE || Setting::of(r) == *setting)
             .collect()
+    }
+
+    /// Only those episodes whose draws all of some players (surrogate and configuration) have
+    /// played in the same cell: what a table compares is then played on the same draws. A player
+    /// that has played nothing of a cell does not count there.
+    #[must_use]
+    pub fn on_common_draws(&self, players: &[(&str, &str)], setting: &Setting) -> Self {
+        let mut common: HashMap<(&str, &str), HashSet<Draw<'_>>> = HashMap::new();
+        for (backbone, config) in players {
+            let mut own: HashMap<_, HashSet<Draw<'_>>> = HashMap::new();
+            for record in self.of_config(backbone, config, setting) {
+                own.entry(cell_of(record))
+                    .or_default()
+                    .insert(draw_of(record));
+            }
+            for (cell, draws) in own {
+                match common.entry(cell) {
+                    Entry::Occupied(mut known) => known.get_mut().retain(|d| draws.contains(d)),
+                    Entry::Vacant(free) => {
+                        free.insert(draws);
+                    }
+                }
+            }
+        }
+        let shared = |record: &&&EpisodeRecord| {
+            let draws = common.get(&cell_of(record));
+            draws.is_none_or(|draws| draws.contains(&draw_of(record)))
+        };
+        Self {
+            records: self.records.iter().filter(shared).copied().collect(),
+            ..*self
+        }
     }
 
     /// The episodes of a cell.

@@ -480,3 +480,33 @@ fn the_page_for_the_documentation_has_its_pictures_beside_it() {
     }
     assert_eq!(files.len(), named.len() + 1);
 }
+
+#[test]
+fn a_table_compares_on_the_same_draws() {
+    let mut lines = cell();
+    // Another seed with FIT-MAC only, and an ablation with half of the episodes.
+    for episode in 0..10 {
+        let with = json!({"episode": episode, "config": "full", "seed": 11});
+        lines.push(failed(line(with)));
+        let without = json!({"episode": episode, "config": "wo-target"});
+        if episode < 5 {
+            lines.push(line(without));
+        }
+    }
+    let report = report(&lines);
+    let main = table(&report, "main-guarded-modelled-agents");
+    let with = &row(main, "openvla-like surrogate with FIT-MAC")[2];
+    assert_eq!(with.count().unwrap(), "8 of 10");
+    let modules = table(
+        &report,
+        "ablation-openvla-like-object-guarded-modelled-agents",
+    );
+    for (name, count) in [
+        ("FIT-MAC", "5 of 5"),
+        ("without target correction", "5 of 5"),
+    ] {
+        assert_eq!(row(modules, name)[1].count().unwrap(), count, "{name}");
+    }
+    let seeds = table(&report, "seeds-openvla-like-object-guarded-modelled-agents");
+    assert_eq!(row(seeds, "seed 11")[1].count().unwrap(), "0 of 10");
+}

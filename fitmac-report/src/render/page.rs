@@ -64,7 +64,10 @@ pub fn page(report: &Report, path: &Path) -> Result<Vec<PathBuf>, ReportError> {
 fn introduction(report: &Report) -> String {
     let mut text = String::from(
         "# Evaluation\n\nWritten by `cargo xtask evaluate`, not by hand. It plays every episode \
-         below in simulation; the same command gives the same episodes, bit for bit.\n\n",
+         below in simulation; the same command gives the same episodes, bit for bit. A whole run \
+         has 50 episodes a task and cell in the main table, 10 for surrogates, modules, seeds and \
+         harm, and 5 (the paper: 10) for sweeps, displacements, the published parameters and the \
+         modules of a second surrogate. Where a run has ended early there are dashes.\n\n",
     );
     super::markdown::summary(&mut text, report);
     text.push_str(

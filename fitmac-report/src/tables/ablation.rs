@@ -20,6 +20,13 @@ pub fn ablation(source: Source<'_>, setting: &Setting) -> Vec<Table> {
     let ablated = |name: &&str| WITHOUT.iter().any(|(c, _)| source.episodes.has(name, c));
     let mut tables = Vec::new();
     for backbone in source.episodes.backbones().into_iter().filter(ablated) {
+        let configs = WITHOUT.iter().map(|(config, _)| *config);
+        let players: Vec<_> = configs
+            .chain([BASE, FULL])
+            .map(|config| (backbone, config))
+            .collect();
+        let episodes = &source.episodes.on_common_draws(&players, setting);
+        let source = Source { episodes, ..source };
         tables.push(short(source, backbone, setting));
         tables.extend(SUITES.map(|suite| whole(source, suite, backbone, setting)));
     }
@@ -51,7 +58,8 @@ fn short(source: Source<'_>, backbone: &str, setting: &Setting) -> Table {
         topic: Topic::Modules,
         id: format!("ablation-{backbone}-{}", setting.slug()),
         title: format!("Modules, {backbone} surrogate: {}", setting.label()),
-        caption: "Mean success rate over the five perturbations, as in the paper's Table 3."
+        caption: "Mean success rate over the five perturbations, as in the paper's Table 3; all \
+                  configurations on the same draws."
             .to_owned(),
         rows_are: "configuration".to_owned(),
         columns: columns.map(|(g, n)| Column::new(g, n)).to_vec(),

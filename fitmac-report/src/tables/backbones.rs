@@ -8,8 +8,13 @@ use crate::table::{Cell, Column, Row, Table, Topic};
 /// All surrogates: cell by cell (Table 5), and on average (Table 6).
 #[must_use]
 pub fn backbones(source: Source<'_>, setting: &Setting) -> Vec<Table> {
-    let episodes = source.episodes;
-    let names = episodes.backbones();
+    let names = source.episodes.backbones();
+    let players: Vec<_> = names
+        .iter()
+        .flat_map(|name| [(*name, BASE), (*name, FULL)])
+        .collect();
+    let episodes = &source.episodes.on_common_draws(&players, setting);
+    let source = Source { episodes, ..source };
     let rows = |suite: &str| -> Vec<Row> {
         let mut rows = Vec::new();
         for backbone in &names {
@@ -39,7 +44,7 @@ pub fn backbones(source: Source<'_>, setting: &Setting) -> Vec<Table> {
             id: format!("backbones-{suite}-{}", setting.slug()),
             title: format!("Surrogates on {}: {}", suite_title(suite), setting.label()),
             caption: "In the layout of the paper's Table 5; small figures are the paper's, of the \
-                      model that a surrogate is named after."
+                      model that a surrogate is named after. All policies on the same draws."
                 .to_owned(),
             rows_are: "policy".to_owned(),
             columns: line_columns(),

@@ -11,6 +11,9 @@ pub fn main_table(source: Source<'_>, setting: &Setting) -> Vec<Table> {
     if !source.episodes.has(MAIN, BASE) && !source.episodes.has(MAIN, FULL) {
         return Vec::new();
     }
+    let players = [(MAIN, BASE), (MAIN, FULL)];
+    let episodes = &source.episodes.on_common_draws(&players, setting);
+    let source = Source { episodes, ..source };
     vec![comparison(source, setting), behaviour(source, setting)]
 }
 
@@ -41,8 +44,8 @@ fn comparison(source: Source<'_>, setting: &Setting) -> Table {
         id: format!("main-{}", setting.slug()),
         title: format!("Success: {}", setting.label()),
         caption: "Success rate, %, in the layout of the paper's Table 1. The last two rows are \
-                  measured here, of a surrogate policy; beside them the paper's figures, which are \
-                  of OpenVLA itself. The rows above are published figures of other methods, from \
+                  measured here, of a surrogate policy on the same draws; beside them the paper's figures, \
+                  which are of OpenVLA itself. The rows above are published figures of other methods, from \
                   the same table."
             .to_owned(),
         rows_are: "method".to_owned(),

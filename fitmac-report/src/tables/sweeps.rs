@@ -28,8 +28,12 @@ pub fn sweeps(source: Source<'_>, setting: &Setting) -> Vec<Table> {
             {
                 continue;
             }
+            let names: Vec<String> = values.iter().map(|v| config(v)).collect();
+            let swept = names.iter().map(String::as_str).chain([FULL]);
+            let players: Vec<_> = swept.map(|config| (backbone, config)).collect();
+            let episodes = &source.episodes.on_common_draws(&players, setting);
             let sweep = Sweep {
-                source,
+                source: Source { episodes, ..source },
                 backbone,
                 parameter,
                 values,
@@ -101,7 +105,8 @@ impl Sweep<'_> {
                 self.backbone,
                 self.setting.label()
             ),
-            caption: "Mean success rate over the five perturbations, %, as in the paper's Table 4."
+            caption: "Mean success rate over the five perturbations, %, as in the paper's Table \
+                      4; all values on the same draws."
                 .to_owned(),
             rows_are: "value".to_owned(),
             columns: ["Object", "Spatial", "mean"]
