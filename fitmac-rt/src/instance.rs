@@ -12,6 +12,8 @@ use std::{
 use iceoryx2::prelude::{Config, FileName, Node, Path as IoxPath, SemanticString, ipc};
 use rustix::fs::{FlockOperation, flock};
 
+use crate::room::SHARED_MEMORY;
+
 /// Longest name of an instance.
 const NAME_CAPACITY: usize = 40;
 /// Longest path of an instance's directory (a limit of the shared-memory library).
@@ -59,6 +61,18 @@ pub enum InstanceError {
         root: PathBuf,
         /// The process id that it left in its lock file.
         pid: String,
+    },
+    /// Shared memory has no room.
+    #[error(
+        "shared memory ({SHARED_MEMORY}) has {} KiB free, and an instance needs {} KiB: remove what fills it (`ls -l {SHARED_MEMORY}`; `fitmac rt clean` for what dead processes left), or enlarge it (`mount -o remount,size=64M {SHARED_MEMORY}`; for a container `--shm-size=64m`)",
+        .free >> 10,
+        .needed >> 10
+    )]
+    NoRoom {
+        /// What is free, bytes.
+        free: u64,
+        /// What has to be, bytes.
+        needed: u64,
     },
     /// The shared-memory library refused.
     #[error(
@@ -171,9 +185,9 @@ impl Instance {
         found
     }
 
-    fn shared_memory_files(&self) -> Vec<PathBuf> {
+    pub(crate) fn shared_memory_files(&self) -> Vec<PathBuf> {
         let prefix = self.prefix();
-        fs::read_dir("/dev/shm")
+        fs::read_dir(SHARED_MEMORY)
             .into_iter()
             .flatten()
             .flatten()

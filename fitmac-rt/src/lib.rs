@@ -26,6 +26,7 @@ pub mod realtime;
 pub mod replay;
 pub mod ring;
 pub mod roles;
+mod room;
 pub mod service;
 pub mod signals;
 pub mod telemetry;

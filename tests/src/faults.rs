@@ -96,23 +96,23 @@ faults! {
     D5 "a sender has another version" => "dropped unread and counted; the age is a hold" in TRANSPORT, ["d5_another_version_is_dropped_unread"];
     D6 "a peer is killed" => "hold; it may come back" in TRANSPORT, ["d6_a_killed_robot_may_come_back"];
     D7 "shared memory is removed" => "who is connected stays so; who drops out is a hold" in TRANSPORT, ["d7_removed_shared_memory_ends_in_a_hold_at_the_latest"];
-    D8 "there is too little shared memory" => "the controller dies while it starts, before the first tick: its memory is all touched by then" in TRANSPORT, [];
+    D8 "there is too little shared memory" => "refused at the start, with what it needs and how to get it; all of it is taken before the first tick" in TRANSPORT, ["d8_too_little_shared_memory_is_refused_by_name"];
     D9 "a foreign process writes into messages" => "each is copied once and checked on the copy: nothing unsound comes out" in TRANSPORT, ["d9_a_foreign_writer_gets_nothing_unsound_through"];
     D10 "a hostile process sends broken offsets" => "not defended: shared memory is for processes that trust each other; put a socket between you and others" in TRANSPORT, [];
     D11 "another user opens the files" => "refused by the system: only their owner may" in TRANSPORT, ["d11_only_their_owner_may_open_the_files"];
     D12 "a message is read while it is written" => "never: it is sent whole" in TRANSPORT, ["d12_a_message_is_never_torn"];
     E1 "the controller is killed" => "the robot stops by itself; the next run resumes nothing" in PROCESS, ["e1_a_killed_controller_is_safe_and_starts_afresh"];
     E2 "it is asked to end" => "a controlled stop, a last command, a whole trace; a second signal ends it at once" in PROCESS, ["e2_a_termination_is_a_controlled_stop_and_a_whole_trace", "e2_a_second_signal_ends_at_once"];
-    E3 "it crashes" => "the robot stops by itself, as if it had been killed" in PROCESS, [];
+    E3 "it crashes" => "the robot stops by itself, as if it had been killed" in PROCESS, ["e3_a_crashed_controller_is_safe"];
     E4 "memory cannot be locked" => "refused by name, unless --allow-non-rt" in PROCESS, ["e4_memory_that_cannot_be_locked_is_refused_by_name"];
     E5 "real-time priority is not allowed" => "refused by name, unless --allow-non-rt" in PROCESS, ["e5_a_priority_that_is_not_allowed_is_refused_by_name"];
-    E6 "the disk is full" => "the trace ends and says so; the loop goes on" in PROCESS, [];
+    E6 "the disk is full" => "the trace ends and says so; the loop goes on, and what is not recorded is counted" in PROCESS, ["e6_a_full_disk_ends_the_trace_and_not_the_loop"];
     E7 "no more files may be opened, or the trace is removed" => "nothing: all is open since the start" in PROCESS, ["e7_the_loop_needs_no_file_that_is_not_open"];
     E8 "the C interface gets bad arguments" => "a status, never a crash" in BORDER, BORDER_TESTS;
     E9 "it is called from two threads at once" => "a status, never a race" in BORDER, BORDER_TESTS;
     E10 "the host changes the floating-point mode" => "seen and reported; a tick computes in the core's own mode" in BORDER, BORDER_TESTS;
     E11 "the host forks" => "the handle is void in the child" in BORDER, BORDER_TESTS;
-    E12 "another process is pinned to the control core" => "not detected: the cadence report shows it; give the policy other cores" in PROCESS, [];
+    E12 "another process is pinned to the control core" => "skipped periods are counted and reported, not prevented: give the policy other cores" in PROCESS, ["e12_whoever_takes_the_control_core_shows_in_the_counts"];
     F1 "a key is unknown, a type is wrong" => "refused by name" in CONFIGURATION, ["f1_an_unknown_key_is_refused_by_name", "f1_a_wrong_type_is_refused_by_name"];
     F2 "values are out of range" => "refused, all named at once" in CONFIGURATION, ["f2_every_value_out_of_range_is_named_at_once"];
     F3 "the file is too large or too deep" => "refused" in CONFIGURATION, ["f3_a_file_that_is_too_large_is_refused", "f3_a_file_that_is_nested_too_deeply_is_refused"];
@@ -122,7 +122,7 @@ faults! {
     F7 "a label holds control characters" => "refused by name" in CONFIGURATION, ["f7_a_label_with_control_characters_is_refused"];
     F8 "labels are equal" => "ids are the keys, never labels" in "fitmac-agents/src/model/tests.rs", ["the_resolver_chooses_among_candidates_only"];
     F9 "a trace file is damaged or cut off" => "read up to the damage, and says so" in "fitmac-rt/tests/trace.rs", ["a_truncated_file_is_read_up_to_its_end_and_says_so", "a_flipped_bit_never_passes_and_never_panics"];
-    F10 "the configuration changes in mid-run" => "not possible: a controller reads its parameters once" in CONFIGURATION, [];
+    F10 "the configuration changes in mid-run" => "nothing: a controller reads its parameters once, and its trace holds them" in CONFIGURATION, ["f10_a_file_that_changes_in_mid_run_changes_nothing"];
 }
 
 /// What was measured of a reaction. Times are of the machine that measured;
@@ -201,8 +201,8 @@ fn page_of(measured: &Measured) -> String {
          from `tests/src/faults.rs`; the times by `cargo xtask faults`.\n\n\
          Each test runs `fitmac rt` as a process and checks the reaction, a bound on how far \
          the arm gets, and that no file is left; some loosen a threshold of the default \
-         parameters, so that a busy machine does not interfere. A row without a test says what \
-         should happen; nothing shows it yet. Times are those of one run ({}): they tell the \
+         parameters, so that a busy machine does not interfere. A row without a test names \
+         what is not defended. Times are those of one run ({}): they tell the \
          order of magnitude. A stop of ours is a request: the robot's own safety functions \
          stay in the robot.\n",
         measured.run

@@ -97,6 +97,7 @@ pub fn controller(
     )?;
     let mut cycle = Cycle::new(endpoint, Controller::new(role.params), record);
     let run = || -> Result<_, ControllerError> {
+        role.instance.take_memory()?;
         let prepared = role.real_time.prepare()?;
         started(&prepared.measures);
         let ended = control_loop::run(&mut cycle, &role.timing, &cadence, signals)?;

@@ -2,7 +2,12 @@
 
 use std::fs;
 
-use fitmac_tests::{cell::Cell, fitmac::Place};
+use fitmac_tests::{
+    cell::{AgentsState, Cell, PolicyState, RobotState},
+    fitmac::Place,
+};
+
+use crate::now_ns;
 
 /// The controller does not start with this file, and says why.
 fn refused(text: &str, says: &[&str]) {
@@ -62,4 +67,30 @@ fn f7_a_label_with_control_characters_is_refused() {
     assert_eq!(said.status.code(), Some(2), "{}", said.stderr);
     assert!(said.stderr.contains("label"), "{}", said.stderr);
     assert!(!said.stderr.contains('\u{1b}') && !said.stdout.contains('\u{1b}'));
+}
+
+#[test]
+fn f10_a_file_that_changes_in_mid_run_changes_nothing() {
+    let mut cell = Cell::empty();
+    cell.add_robot(RobotState::default());
+    cell.add_policy(PolicyState::moving());
+    cell.add_agents(AgentsState::default());
+    let file = cell.folder().join("robot.toml");
+    fs::write(&file, "[gate]\nfailure_streak = 9\n").expect("writes");
+    cell.start(&["--config", "robot.toml", "--trace", "run.mcap"]);
+    fs::write(&file, "[gate]\nfailure_streak = 0\nnonsense").expect("writes");
+    let since = now_ns();
+    let first = cell.wait("a command", since, |_| true).command.sequence;
+    cell.wait("a thousand more", since, |h| {
+        h.command.sequence > first + 1000
+    });
+    let ended = cell.end_rt();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    // The trace says with which parameters it ran, and they give every answer again.
+    let replay = cell.another(&["replay", "run.mcap"]).finish();
+    assert_eq!(replay.status.code(), Some(0), "{}", replay.stdout);
+    let other = ["replay", "run.mcap", "--what-if", "gate.failure_streak=9"];
+    let same = cell.another(&other).finish();
+    assert_eq!(same.status.code(), Some(0), "{}", same.stdout);
+    cell.assert_nothing_is_left();
 }

@@ -1,9 +1,14 @@
 //! E. Processes and the system.
 
-use std::{fs, process::Command as Process};
+use std::{
+    fs, os::unix::process::ExitStatusExt as _, process::Command as Process, thread, time::Duration,
+};
 
 use fitmac_core::{message::Command, wire::Mode};
-use fitmac_rt::endpoint::StopCause;
+use fitmac_rt::{
+    endpoint::StopCause,
+    realtime::{Core, RealTime, allowed_cores},
+};
 use fitmac_tests::{
     cell::{AgentsState, Cell, Heard, Moment, PolicyState, RobotState, signal},
     fitmac::wait_for,
@@ -101,6 +106,27 @@ fn e2_a_second_signal_ends_at_once() {
     cell.assert_nothing_is_left();
 }
 
+#[test]
+fn e3_a_crashed_controller_is_safe() {
+    let mut cell = moving(&[]);
+    let crashed = now_ns();
+    // Rust's own handler takes the first one, for it finds no cause: it comes
+    // from us. Then the system's default stands.
+    while cell.rt().is_running() {
+        signal(cell.rt().pid(), Signal::SEGV);
+        thread::sleep(Duration::from_millis(1));
+    }
+    let ended = cell.finish_rt();
+    assert_eq!(ended.status.signal(), Some(Signal::SEGV.as_raw()));
+    let stop = own_stop(&cell, crashed, StopCause::Silence);
+    let far_m = stop_distance_m(&cell, crashed, STOP_MAX_M);
+    let test = "e3_a_crashed_controller_is_safe";
+    note_time(test, crashed, stop.now_ns, Some(far_m));
+    // Another run takes its place, and cleans up after it.
+    cell.start(&[]);
+    cell.close();
+}
+
 /// Starts the controller without some rights, and without `--allow-non-rt`.
 fn without_rights(cell: &Cell, wrapper: &[&str]) -> fitmac_tests::fitmac::Finished {
     cell.start_strictly_under(wrapper, &["--ticks", "50"])
@@ -152,6 +178,48 @@ fn e5_a_priority_that_is_not_allowed_is_refused_by_name() {
 }
 
 #[test]
+fn e6_a_full_disk_ends_the_trace_and_not_the_loop() {
+    let mut cell = Cell::empty();
+    cell.add_robot(RobotState::default());
+    cell.add_policy(PolicyState::moving());
+    cell.add_agents(AgentsState::default());
+    // A disk of its own, so small that it is full after a moment.
+    let small = "mkdir disk && mount -t tmpfs -o size=200k none disk && exec \"$0\" \"$@\"";
+    let since = now_ns();
+    cell.start_with(
+        &["unshare", "-m", "sh", "-c", small],
+        &["--backbone-only", "--trace", "disk/run.mcap"],
+    );
+    assert_eq!(cell.wait_for_count("recorders_failed"), 1);
+    let acting = cell.wait("actions", now_ns(), Heard::acts);
+    let ended = cell.end_rt();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    for says in [
+        "disk/run.mcap stopped: No space left on device",
+        "the loop goes on without it",
+        "disk/run.mcap is incomplete",
+    ] {
+        assert!(ended.stderr.contains(says), "{says}: {}", ended.stderr);
+    }
+    // It says how much is lost.
+    let (took, of) = ticks_taken(&ended.stderr);
+    assert!(0 < took && took < of, "{took} of {of}");
+    let commands = cell.commands_since(since);
+    assert!(commands.iter().all(|h| h.session == acting.session));
+    cell.assert_nothing_is_left();
+}
+
+/// The numbers in `it took 12 of 345 ticks`.
+fn ticks_taken(said: &str) -> (u64, u64) {
+    let words: Vec<&str> = said.split_whitespace().collect();
+    let found = words.windows(5).find_map(|w| match w {
+        ["took", took, "of", of, "ticks"] => Some((took.parse().ok()?, of.parse().ok()?)),
+        _ => None,
+    });
+    found.unwrap_or_else(|| panic!("no numbers: {said}"))
+}
+
+#[test]
 fn e7_the_loop_needs_no_file_that_is_not_open() {
     let mut cell = moving(&["--trace", "run.mcap"]);
     let pid = cell.rt().pid().to_string();
@@ -177,4 +245,34 @@ fn e7_the_loop_needs_no_file_that_is_not_open() {
     );
     cell.instance().clean_up().expect("cleans");
     cell.assert_nothing_is_left();
+}
+
+#[test]
+fn e12_whoever_takes_the_control_core_shows_in_the_counts() {
+    let mut cell = Cell::empty();
+    cell.add_robot(RobotState::default());
+    cell.add_policy(PolicyState::moving());
+    cell.add_agents(AgentsState::default());
+    // Below everyone else, so that only this controller is in the way of what comes.
+    cell.start(&["--backbone-only", "--priority", "1"]);
+    cell.wait("actions", 0, Heard::acts);
+    let before = cell.count("skipped_periods");
+    let core = allowed_cores().last().copied().expect("a core");
+    let hog = thread::spawn(move || {
+        let above = RealTime {
+            priority: Some(2),
+            core: Core::Number(core),
+            ..RealTime::off()
+        };
+        let _prepared = above.prepare();
+        let until_ns = now_ns() + 50_000_000;
+        while now_ns() < until_ns {
+            std::hint::spin_loop();
+        }
+    });
+    hog.join().expect("no panic");
+    let periods = cell.count("skipped_periods") - before;
+    assert!(periods >= 20, "{periods} periods of 50 were skipped");
+    assert!(cell.count("overruns") > 0);
+    cell.close();
 }

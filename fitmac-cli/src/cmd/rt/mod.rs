@@ -125,7 +125,12 @@ fn tell(report: &ControllerReport, rate_hz: u32) {
     for recorded in &report.recorded {
         match &recorded.outcome {
             Ok(()) => {}
-            Err(e) => eprintln!("fitmac: {} is incomplete: {e}", recorded.name),
+            Err(e) => eprintln!(
+                "fitmac: {} is incomplete: {e}; it took {} of {} ticks",
+                recorded.name,
+                recorded.ticks,
+                report.cadence.value("ticks").unwrap_or(0)
+            ),
         }
     }
     Report::Cadence(cadence(&report.cadence, &report.measures, rate_hz)).send();
