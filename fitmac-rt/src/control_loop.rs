@@ -15,6 +15,9 @@ use crate::{
 
 /// Slowest and fastest loop, ns: 250 Hz and 2 kHz.
 pub const PERIOD_RANGE_NS: core::ops::RangeInclusive<u64> = 500_000..=4_000_000;
+/// A tick is rehearsed if there is so much time until it is due, ns: with
+/// nothing in the caches it takes 10 to 20 us.
+const REHEARSAL_NS: u64 = 40_000;
 /// The receivers' counts are published once in this many ticks.
 const COUNTS_EVERY: u64 = 128;
 
@@ -224,6 +227,10 @@ impl Pace {
         cadence.wake.record(now_ns.saturating_sub(wake_ns));
         match options.trigger {
             Trigger::Deadline { .. } => {
+                if now_ns + REHEARSAL_NS < self.deadline_ns {
+                    cycle.rehearse(self.deadline_ns);
+                    now_ns = clock::now_ns();
+                }
                 while now_ns < self.deadline_ns {
                     core::hint::spin_loop();
                     now_ns = clock::now_ns();
@@ -232,8 +239,11 @@ impl Pace {
             Trigger::State { patience_ns, .. } => {
                 let limit_ns = self.deadline_ns + patience_ns;
                 let mut arrived = cycle.endpoint().poll_state();
+                if !arrived && now_ns + REHEARSAL_NS < self.deadline_ns {
+                    cycle.rehearse(self.deadline_ns);
+                }
                 while !arrived && now_ns < limit_ns {
-                    core::hint::spin_loop();
+                    cycle.endpoint().poll_next();
                     arrived = cycle.endpoint().poll_state();
                     now_ns = clock::now_ns();
                 }

@@ -149,15 +149,43 @@ impl<T: Payload> Envelope<T> {
         }
     }
 
-    /// Copies an envelope out of memory that its sender can still write to.
+    /// Copies an envelope out of memory that its sender can still write to:
+    /// once, and no more of a counted array than is in use. What stood here
+    /// behind that stays.
     ///
     /// # Safety
     /// `source` must point to a readable, aligned envelope.
     pub unsafe fn copy_from_shared(&mut self, source: *const Self) {
-        // SAFETY: the caller's promise; every bit pattern is valid.
-        unsafe { core::ptr::copy_nonoverlapping(source, self, 1) };
+        let sent = source.cast::<u8>();
+        match const { T::LAYOUT.tail() } {
+            // SAFETY: the caller's promise.
+            None => unsafe { self.copy_bytes(sent, 0, size_of::<Self>()) },
+            Some(tail) => {
+                let fixed = size_of::<Header>() + tail.offset();
+                // SAFETY: the caller's promise.
+                unsafe { self.copy_bytes(sent, 0, fixed) };
+                // Our copy says how much follows, and never more than there is.
+                let used = size_of::<Header>() + tail.used(self.payload.as_bytes());
+                // SAFETY: the caller's promise.
+                unsafe { self.copy_bytes(sent, fixed, used) };
+            }
+        }
         // The copy is what is read from here on: the compiler must not go
         // back to the shared original.
+        core::sync::atomic::compiler_fence(core::sync::atomic::Ordering::SeqCst);
+        core::hint::black_box(self);
+    }
+
+    /// Copies the bytes from `begin` to `end`.
+    ///
+    /// # Safety
+    /// `source` must point to a readable envelope.
+    unsafe fn copy_bytes(&mut self, source: *const u8, begin: usize, end: usize) {
+        assert!(begin <= end && end <= size_of::<Self>());
+        let to = core::ptr::from_mut(self).cast::<u8>();
+        // SAFETY: both are envelopes, `source` by the caller's promise; the
+        // range lies within, and every bit pattern is valid.
+        unsafe { core::ptr::copy_nonoverlapping(source.add(begin), to.add(begin), end - begin) };
         core::sync::atomic::compiler_fence(core::sync::atomic::Ordering::SeqCst);
         core::hint::black_box(self);
     }

@@ -68,6 +68,11 @@ impl<T: Payload, Tr: Transport> Sender<T, Tr> {
         self.writer.refresh()
     }
 
+    /// Does what sending will do, as far as no receiver can see it.
+    pub(crate) fn rehearse(&mut self) {
+        self.writer.rehearse();
+    }
+
     /// Sends a message under any header: for tests of the receivers.
     ///
     /// # Errors

@@ -154,6 +154,8 @@ mod tests {
             if let Some(tick) = read.next_tick() {
                 assert_eq!(tick.output.command.sequence, next);
                 next += 1;
+            } else {
+                std::thread::yield_now();
             }
         }
         writer.join().expect("no panic");

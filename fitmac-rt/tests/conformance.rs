@@ -2,7 +2,7 @@
 
 use fitmac_core::{
     Controller, Params,
-    message::{ActionChunk, Command, GroundingRecord, PolicyQuery, StateSample},
+    message::{ActionChunk, CHUNK_CAPACITY, Command, GroundingRecord, PolicyQuery, StateSample},
 };
 use fitmac_rt::{
     endpoint::{AgentsEndpoint, ControllerEndpoint, HarnessEndpoint, PolicyEndpoint},
@@ -18,6 +18,7 @@ use fitmac_rt::{
 fn chunk(sequence: u64) -> ActionChunk {
     ActionChunk {
         sequence,
+        horizon: CHUNK_CAPACITY as u32,
         actions: core::array::from_fn(|i| [sequence as f32 + i as f32; 7]),
         ..ActionChunk::default()
     }

@@ -28,7 +28,11 @@ pub struct ControllerEndpoint<Tr: Transport> {
     query: Sender<PolicyQuery, Tr>,
     rebind: Sender<RebindRequest, Tr>,
     fresh: Fresh,
+    turn: u32,
 }
+
+/// The services beside the state.
+const OTHERS: u32 = 6;
 
 /// Which services had a message in this tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -61,6 +65,7 @@ impl<Tr: Transport> ControllerEndpoint<Tr> {
             critic: Receiver::connect(transport, &service::CRITIC)?,
             request: Receiver::connect(transport, &service::REQUEST)?,
             fresh: Fresh::default(),
+            turn: 0,
         })
     }
 
@@ -77,21 +82,57 @@ impl<Tr: Transport> ControllerEndpoint<Tr> {
         self.fresh.state
     }
 
-    /// Takes at most one waiting message of each service, but no second state
-    /// sample after [`poll_state`](Self::poll_state) found one.
+    /// Looks at the next one of the other services, in turn: what a loop does
+    /// while it waits for the state, so that nothing but the state is left to
+    /// be looked at when it comes.
+    pub fn poll_next(&mut self) {
+        self.poll_other(self.turn % OTHERS);
+        self.turn = self.turn.saturating_add(1);
+    }
+
+    /// Looks at all the other services.
+    pub(crate) fn poll_others(&mut self) {
+        (0..OTHERS).for_each(|service| self.poll_other(service));
+    }
+
+    /// Takes at most one waiting message of each service, but no second one
+    /// after [`poll_state`](Self::poll_state) or [`poll_next`](Self::poll_next)
+    /// found one. Services that `poll_next` has just gone round are not looked
+    /// at again.
     pub fn poll_rest(&mut self) {
         self.poll_state();
-        self.fresh.chunk = self.chunk.receive();
-        self.fresh.grounding = self.grounding.receive();
-        self.fresh.plan = self.plan.receive();
-        self.fresh.verifier = self.verifier.receive();
-        self.fresh.critic = self.critic.receive();
-        self.fresh.request = self.request.receive();
+        if self.turn < OTHERS {
+            self.poll_others();
+        }
+    }
+
+    fn poll_other(&mut self, service: u32) {
+        let fresh = &mut self.fresh;
+        match service {
+            0 => fresh.chunk = fresh.chunk || self.chunk.receive(),
+            1 => fresh.grounding = fresh.grounding || self.grounding.receive(),
+            2 => fresh.plan = fresh.plan || self.plan.receive(),
+            3 => fresh.verifier = fresh.verifier || self.verifier.receive(),
+            4 => fresh.critic = fresh.critic || self.critic.receive(),
+            _ => fresh.request = fresh.request || self.request.receive(),
+        }
     }
 
     /// Forgets what was polled: the next tick starts with nothing new.
     pub fn clear(&mut self) {
         self.fresh = Fresh::default();
+        self.turn = 0;
+    }
+
+    /// Does what [`publish`](Self::publish) will do with a command, as far as
+    /// nobody can see it.
+    pub(crate) fn rehearse(&mut self) {
+        self.command.rehearse();
+    }
+
+    /// The newest state sample, whether a tick has used it or not.
+    pub(crate) fn newest_state(&self) -> &StateSample {
+        &self.state.newest().payload
     }
 
     /// When the polled state sample was sent, ns; `None` if there is none.

@@ -48,8 +48,9 @@ impl Ipc {
     /// Joins an instance. What processes that died have left is removed first.
     ///
     /// # Errors
-    /// If the instance's directory cannot be used.
+    /// If the instance's directory cannot be used, or shared memory has no room.
     pub fn join(instance: &Instance) -> Result<Self, InstanceError> {
+        instance.look_for_room()?;
         iceoryx2::prelude::set_log_level_from_env_or(iceoryx2::prelude::LogLevel::Fatal);
         let membership = instance.join()?;
         let node = NodeBuilder::new()
@@ -219,11 +220,14 @@ impl<T: Payload> Write<T> for IpcWriter<T> {
             .loan_uninit()
             .map_err(|_| TransportFault("no sample could be loaned"))?;
         let place = sample.payload_mut().as_mut_ptr();
+        let used = payload.used_bytes();
         // SAFETY: `place` points to an envelope's memory that is loaned to us
-        // alone; both fields are written, and there is no padding.
+        // alone. There is no padding; what is not in use keeps the bytes of
+        // shared memory, zeros at first, and every bit pattern is valid.
         let sample = unsafe {
             (&raw mut (*place).header).write(header);
-            (&raw mut (*place).payload).copy_from_nonoverlapping(payload, 1);
+            let to = (&raw mut (*place).payload).cast::<u8>();
+            to.copy_from_nonoverlapping(used.as_ptr(), used.len());
             sample.assume_init()
         };
         sample
@@ -236,6 +240,15 @@ impl<T: Payload> Write<T> for IpcWriter<T> {
         self.publisher
             .update_connections()
             .map_err(|_| TransportFault("a new receiver could not be connected"))
+    }
+
+    fn rehearse(&mut self) {
+        // The memory of the next message, without a message.
+        if let Ok(mut sample) = self.publisher.loan_uninit() {
+            let place = sample.payload_mut().as_mut_ptr();
+            // SAFETY: it is loaned to us alone, and given back unsent.
+            unsafe { (&raw mut (*place).header).write(Envelope::<T>::header(0, 0, 0)) };
+        }
     }
 }
 

@@ -54,6 +54,10 @@ pub trait Write<T: Payload> {
     /// # Errors
     /// If the transport failed.
     fn refresh(&mut self) -> Result<(), TransportFault>;
+
+    /// Does what a later [`write`](Self::write) will do, as far as nobody can
+    /// see it: its code and its memory are in the caches then.
+    fn rehearse(&mut self) {}
 }
 
 /// The receiving end of a service.
