@@ -29,9 +29,12 @@ pub fn program() -> &'static Path {
         if let Some(installed) = std::env::var_os("FITMAC_PROGRAM") {
             return installed.into();
         }
-        // target/PROFILE/deps/TEST-HASH
-        let test = std::env::current_exe().expect("the path of the test");
-        let folder = test.ancestors().nth(2).expect("the profile's folder");
+        // target/PROFILE/deps/TEST-HASH, or target/PROFILE/PROGRAM
+        let this = std::env::current_exe().expect("the path of this program");
+        let mut folders = this.ancestors().skip(1);
+        let folder = folders
+            .find(|folder| !folder.ends_with("deps"))
+            .expect("the profile's folder");
         let profile = match folder.file_name().and_then(|name| name.to_str()) {
             Some("debug") | None => "dev",
             Some(other) => other,

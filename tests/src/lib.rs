@@ -11,3 +11,5 @@ pub mod link;
 #[cfg(feature = "programs")]
 pub mod openpi;
 pub mod oracle;
+#[cfg(feature = "programs")]
+pub mod soak_rt;

@@ -85,6 +85,10 @@ enum Command {
     Faults(cmd::faults::Args),
     /// Play every experiment of the paper and make the report (hours; it goes on where it ended).
     Evaluate(cmd::evaluate::Args),
+    /// Run one controller with demo after demo around it: nothing may grow (half an hour).
+    SoakRt(cmd::soak_rt::Args),
+    /// Count allocations and system calls of the control thread (a million ticks: 9 minutes).
+    Quiet(cmd::quiet::Args),
     /// Say what the machine lacks to build and test.
     Doctor(cmd::doctor::Args),
 }
@@ -111,6 +115,8 @@ fn main() -> ExitCode {
         Command::Mutants(args) => cmd::mutants::run(&workspace, &args),
         Command::Coverage(args) => cmd::coverage::run(&workspace, &args),
         Command::Soak(args) => cmd::soak::run(&workspace, &args),
+        Command::Quiet(args) => cmd::quiet::run(&workspace, &args),
+        Command::SoakRt(args) => cmd::soak_rt::run(&workspace, &args),
         Command::Doctor(args) => cmd::doctor::run(&workspace, &args),
     };
     match result {
