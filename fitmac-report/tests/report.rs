@@ -113,6 +113,24 @@ fn texts(cells: &[Cell]) -> Vec<String> {
 }
 
 #[test]
+fn own_grounding_stands_beside_what_the_simulator_knows() {
+    // Ours: 0 to 4 and 6 to 8 succeed. The simulator's: all but 0 and 9.
+    let mut lines = cell();
+    for episode in 0..10 {
+        let with = line(json!({"episode": episode, "config": "full", "knowledge": "simulator"}));
+        lines.push(if matches!(episode, 0 | 9) {
+            failed(with)
+        } else {
+            with
+        });
+    }
+    let report = report(&lines);
+    let name = "pos, openvla-like surrogate: guarded profile, modelled poses, own grounding";
+    let cells = texts(row(table(&report, "knowledge"), name));
+    assert_eq!(cells, ["10", "80.0", "80.0", "1", "1"]);
+}
+
+#[test]
 fn pairs_are_what_the_hand_counts() {
     let report = report(&cell());
     let pairs = &report.verdicts[0].pairs;

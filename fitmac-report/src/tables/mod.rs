@@ -4,6 +4,7 @@ mod ablation;
 mod backbones;
 mod cost;
 mod failures;
+mod knowledge;
 mod main_table;
 mod remaining;
 mod seeds;
@@ -14,6 +15,7 @@ pub use ablation::ablation;
 pub use backbones::backbones;
 pub use cost::{cost, pairs_of};
 pub use failures::failures;
+pub use knowledge::knowledge;
 pub use main_table::main_table;
 pub use remaining::{ceilings, remaining};
 pub use seeds::seeds;
@@ -51,6 +53,7 @@ pub fn all(source: Source<'_>) -> Vec<Table> {
         tables.extend(failures(source, &setting));
     }
     tables.extend(cost(source));
+    tables.extend(knowledge(source));
     tables.sort_by_key(|table| table.topic);
     tables
 }
