@@ -1,4 +1,5 @@
 //! An orderly end: the first signal asks for it, the second forces it.
+#![allow(unsafe_code)]
 
 use std::{
     io,
@@ -10,7 +11,7 @@ use std::{
 
 use signal_hook::{
     consts::{SIGINT, SIGTERM, SIGUSR1},
-    flag,
+    flag, low_level,
 };
 
 /// Exit status after the second signal: 128 + SIGINT, as shells count.
@@ -38,9 +39,16 @@ impl Signals {
     pub fn listen() -> io::Result<Self> {
         let signals = Self::default();
         for signal in [SIGTERM, SIGINT] {
-            // In this order: the first signal finds the flag unset, and sets it.
-            flag::register_conditional_shutdown(signal, FORCED_EXIT, Arc::clone(&signals.stop))?;
-            flag::register(signal, Arc::clone(&signals.stop))?;
+            let stop = Arc::clone(&signals.stop);
+            let asked = move || {
+                // One step, for two threads may handle two signals at once.
+                if stop.swap(true, Ordering::Relaxed) {
+                    low_level::exit(FORCED_EXIT);
+                }
+            };
+            // SAFETY: in a handler, as here, an atomic may be swapped and the
+            // process left without any clean-up; nothing is allocated or locked.
+            unsafe { low_level::register(signal, asked) }?;
         }
         flag::register(SIGUSR1, Arc::clone(&signals.report))?;
         Ok(signals)
