@@ -12,7 +12,7 @@ use std::{
 
 use fitmac_core::{Controller, Params};
 use fitmac_rt::{
-    control_loop::{self, LoopOptions},
+    control_loop::{self, LoopOptions, Trigger},
     counters::Cadence,
     cycle::Cycle,
     endpoint::ControllerEndpoint,
@@ -204,6 +204,8 @@ pub(crate) fn run(instance: &Instance, rate: u32, flow: &Arc<Flow>, gate: &Gate)
         ticks_max: Some(WARM_UP + gate.ticks),
         // A stop for overruns would end what is watched.
         overruns_in_a_row_max: u32::MAX,
+        // Long enough for the rehearsal, which shall be quiet, too.
+        trigger: Trigger::Deadline { spin_ns: 150_000 },
         ..LoopOptions::default()
     };
     control_loop::run(&mut cycle, &options, &cadence, &signals).expect("a rate in range");
