@@ -8,6 +8,7 @@ pub mod faults;
 #[cfg(feature = "programs")]
 pub mod fitmac;
 pub mod link;
+pub mod meter;
 #[cfg(feature = "programs")]
 pub mod openpi;
 pub mod oracle;

@@ -1,53 +1,17 @@
-//! A counting allocator: calls of the thread that asks. That the meter works is tested too.
+//! Calls of the allocator while something runs. That the meter works is tested too.
 
-use std::{
-    alloc::{GlobalAlloc, Layout, System},
-    cell::Cell,
-    hint::black_box,
-};
+use std::hint::black_box;
 
-thread_local! {
-    static CALLS: Cell<u64> = const { Cell::new(0) };
-}
-
-/// Counts the calls of its own thread.
-struct Meter;
-
-fn count() {
-    // A thread that is being torn down has no counter any more.
-    let _gone = CALLS.try_with(|calls| calls.set(calls.get() + 1));
-}
-
-// SAFETY: every call goes to the system's allocator unchanged.
-#[allow(unsafe_code)]
-unsafe impl GlobalAlloc for Meter {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promise is passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
-        count();
-        // SAFETY: the caller's promise is passed on.
-        unsafe { System.dealloc(block, layout) }
-    }
-
-    unsafe fn realloc(&self, block: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promise is passed on.
-        unsafe { System.realloc(block, layout, size) }
-    }
-}
+use fitmac_tests::meter::{self, Meter};
 
 #[global_allocator]
 static METER: Meter = Meter;
 
 /// Calls of the allocator while `work` runs.
 pub(crate) fn calls(work: impl FnOnce()) -> u64 {
-    let before = CALLS.get();
+    let before = meter::calls();
     work();
-    CALLS.get() - before
+    meter::calls() - before
 }
 
 #[test]

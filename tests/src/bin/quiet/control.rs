@@ -26,7 +26,12 @@ use fitmac_rt::{
     transport::Ipc,
 };
 
-use crate::{Plant, meter, report::Flow};
+use fitmac_tests::meter::{self, Meter};
+
+use crate::{Plant, report::Flow};
+
+#[global_allocator]
+static METER: Meter = Meter;
 
 /// Ticks before the first that counts: everyone connects.
 const WARM_UP: u64 = 1000;

@@ -8,7 +8,6 @@
 //! thread what opening shared memory costs, once.
 
 mod control;
-mod meter;
 mod report;
 mod tracer;
 

@@ -1,4 +1,5 @@
-//! A counting allocator: calls of the thread that asks.
+//! A counting allocator: calls of the thread that asks. A program that counts makes it its
+//! `#[global_allocator]`.
 
 use std::{
     alloc::{GlobalAlloc, Layout, System},
@@ -9,13 +10,15 @@ thread_local! {
     static CALLS: Cell<u64> = const { Cell::new(0) };
 }
 
+/// Counts the calls of its own thread.
+#[derive(Debug)]
+pub struct Meter;
+
 /// Calls of the allocator by this thread so far.
-pub(crate) fn calls() -> u64 {
+#[must_use]
+pub fn calls() -> u64 {
     CALLS.get()
 }
-
-/// Counts the calls of its own thread.
-struct Meter;
 
 fn count() {
     // A thread that is being torn down has no counter any more.
@@ -43,6 +46,3 @@ unsafe impl GlobalAlloc for Meter {
         unsafe { System.realloc(block, layout, size) }
     }
 }
-
-#[global_allocator]
-static METER: Meter = Meter;
