@@ -98,7 +98,9 @@ impl BlackBox {
             .join(format!("black-box-{}-{reason}.mcap", now_ns / 1_000_000));
         let mut metadata = self.metadata.clone();
         metadata.insert("black_box".into(), reason.into());
-        let mut writer = TraceWriter::new(BufWriter::new(File::create(&path)?), &metadata)?;
+        // The memory of a compressor would have to be found beside a running loop.
+        let file = BufWriter::new(File::create(&path)?);
+        let mut writer = TraceWriter::uncompressed(file, &metadata)?;
         let bytes = self.frames.make_contiguous();
         let mut at = 0;
         while let Some(frame) = bytes.get(at..).filter(|rest| !rest.is_empty()) {

@@ -23,11 +23,13 @@ mod black_box;
 mod csv;
 mod reader;
 mod scene;
+mod topic;
 mod writer;
 
 pub use black_box::BlackBox;
 pub use csv::write_csv;
-pub use reader::{Damage, ReadError, Record, TraceReader, layout_of};
+pub use reader::{Damage, ReadError, Record, TraceReader};
+pub use topic::layout_of;
 pub use writer::{Metadata, TraceFile, TraceWriter};
 
 /// A layout for Foxglove that shows a trace's topics.

@@ -7,20 +7,17 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use fitmac_core::message::{
-    ActionChunk, Command, CriticReport, GroundingRecord, Output, Plan, PolicyQuery, RebindRequest,
-    StateSample, TraceRecord, VerifierReport,
-};
+use fitmac_core::message::{Command, Output};
 use mcap::{
     McapError,
     records::Record as McapRecord,
     sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions},
 };
 
-use super::{codec, schema, writer::METADATA_NAME, writer::Metadata};
+use super::{codec, topic::Topic, writer::METADATA_NAME, writer::Metadata};
 use crate::{
     frame::{Tick, TickHead, contents},
-    layout::{Layout, Payload},
+    layout::Payload,
     message::{ModelCall, PromptText, Status},
 };
 
@@ -90,90 +87,6 @@ pub struct TraceReader<R> {
 enum End {
     Clean,
     Damaged(Damage),
-}
-
-/// A topic that we read; others are passed over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Topic {
-    Tick,
-    State,
-    Chunk,
-    Grounding,
-    Plan,
-    Verifier,
-    Critic,
-    Command,
-    Query,
-    Rebind,
-    Trace,
-    Event,
-    Prompt,
-    ModelCall,
-    Status,
-}
-
-impl Topic {
-    const ALL: [(&str, Self); 15] = [
-        ("/tick", Self::Tick),
-        ("/state", Self::State),
-        ("/chunk", Self::Chunk),
-        ("/grounding", Self::Grounding),
-        ("/plan", Self::Plan),
-        ("/verifier", Self::Verifier),
-        ("/critic", Self::Critic),
-        ("/command", Self::Command),
-        ("/query", Self::Query),
-        ("/rebind", Self::Rebind),
-        ("/trace", Self::Trace),
-        ("/event", Self::Event),
-        ("/prompt", Self::Prompt),
-        ("/model_call", Self::ModelCall),
-        ("/status", Self::Status),
-    ];
-
-    fn schema(self) -> (String, Vec<u8>) {
-        fn of<T: Payload>() -> (String, Vec<u8>) {
-            (schema::full_name::<T>(), schema::descriptor_set::<T>())
-        }
-        match self {
-            Self::Tick => of::<TickHead>(),
-            Self::State => of::<StateSample>(),
-            Self::Chunk => of::<ActionChunk>(),
-            Self::Grounding => of::<GroundingRecord>(),
-            Self::Plan => of::<Plan>(),
-            Self::Verifier => of::<VerifierReport>(),
-            Self::Critic => of::<CriticReport>(),
-            Self::Command => of::<Command>(),
-            Self::Query => of::<PolicyQuery>(),
-            Self::Rebind => of::<RebindRequest>(),
-            Self::Trace | Self::Event => of::<TraceRecord>(),
-            Self::Prompt => of::<PromptText>(),
-            Self::ModelCall => of::<ModelCall>(),
-            Self::Status => of::<Status>(),
-        }
-    }
-}
-
-/// The layout of a topic of ours; `None` for others.
-#[must_use]
-pub fn layout_of(topic: &str) -> Option<Layout> {
-    let (_, topic) = Topic::ALL.iter().find(|(name, _)| *name == topic)?;
-    Some(match topic {
-        Topic::Tick => TickHead::LAYOUT,
-        Topic::State => StateSample::LAYOUT,
-        Topic::Chunk => ActionChunk::LAYOUT,
-        Topic::Grounding => GroundingRecord::LAYOUT,
-        Topic::Plan => Plan::LAYOUT,
-        Topic::Verifier => VerifierReport::LAYOUT,
-        Topic::Critic => CriticReport::LAYOUT,
-        Topic::Command => Command::LAYOUT,
-        Topic::Query => PolicyQuery::LAYOUT,
-        Topic::Rebind => RebindRequest::LAYOUT,
-        Topic::Trace | Topic::Event => TraceRecord::LAYOUT,
-        Topic::Prompt => PromptText::LAYOUT,
-        Topic::ModelCall => ModelCall::LAYOUT,
-        Topic::Status => Status::LAYOUT,
-    })
 }
 
 /// A tick of which messages may still follow.
@@ -339,7 +252,7 @@ impl<R: Read> TraceReader<R> {
     }
 
     fn channel(&mut self, id: u16, schema: u16, name: &str) -> Result<(), String> {
-        let Some((_, topic)) = Topic::ALL.iter().find(|(n, _)| *n == name) else {
+        let Some(topic) = Topic::named(name) else {
             return Ok(());
         };
         if self.schemas.get(&schema) != Some(&topic.schema()) {
@@ -349,7 +262,7 @@ impl<R: Read> TraceReader<R> {
                 env!("CARGO_PKG_VERSION")
             ));
         }
-        self.topics.insert(id, *topic);
+        self.topics.insert(id, topic);
         Ok(())
     }
 

@@ -15,7 +15,7 @@ use foxglove::{
     Encode,
     messages::{FrameTransforms, Log, SceneUpdate},
 };
-use mcap::{WriteOptions, records::MessageHeader};
+use mcap::{Compression, WriteOptions, records::MessageHeader};
 
 use super::{codec, scene::Scene, schema};
 use crate::{
@@ -66,15 +66,30 @@ struct Channels {
 }
 
 impl<W: Write + Seek> TraceWriter<W> {
-    /// Starts a trace.
+    /// Starts a trace, compressed with Zstandard.
     ///
     /// # Errors
     /// If the head cannot be written.
     pub fn new(out: W, metadata: &Metadata) -> io::Result<Self> {
+        Self::packed(out, metadata, Some(Compression::Zstd))
+    }
+
+    /// Starts a trace that is not compressed: it takes no memory to speak of, and less time.
+    ///
+    /// # Errors
+    /// If the head cannot be written.
+    pub fn uncompressed(out: W, metadata: &Metadata) -> io::Result<Self> {
+        Self::packed(out, metadata, None)
+    }
+
+    fn packed(out: W, metadata: &Metadata, compression: Option<Compression>) -> io::Result<Self> {
         let mut mcap = WriteOptions::new()
             .profile("fitmac")
             .library(format!("fitmac {}", env!("CARGO_PKG_VERSION")))
             .chunk_size(Some(CHUNK_BYTES))
+            .compression(compression)
+            // Threads of its own would take cores and memory from a control machine.
+            .compression_threads(0)
             .create(out)
             .map_err(to_io)?;
         mcap.write_metadata(&mcap::records::Metadata {
