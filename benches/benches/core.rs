@@ -2,7 +2,8 @@
 //! message over iceoryx2 in the same run.
 //!
 //! `cargo xtask bench core [--json | --check | --renew | --search SEEDS]`. The exit status is 1 if
-//! a bound is missed or, with `--check`, if a count is worse than the baseline's.
+//! a count is worse than the baseline's; what misses a target is said, and `docs/measures.md` says
+//! what takes the instructions.
 
 #[path = "core/hop.rs"]
 mod hop;
@@ -19,7 +20,8 @@ use fitmac_benches::{
 };
 use serde_json::json;
 
-/// Instructions of the decision: of the ordinary tick while the policy is watched, and of any.
+/// Targets for the instructions of the decision: of the ordinary tick while the policy is watched,
+/// and of any.
 const MONITORED_AT_MOST: u64 = 2_500;
 const ANY_AT_MOST: u64 = 6_000;
 const SEARCH_TICKS: usize = 1000;
@@ -67,13 +69,18 @@ fn check() -> anyhow::Result<()> {
         println!("{NO_VALGRIND}");
         return Ok(());
     };
-    let worse = baseline::worse(&baseline::read()?, &now);
+    compare(&now)?;
+    println!("no tick costs more than in the baseline");
+    Ok(())
+}
+
+fn compare(now: &Table) -> anyhow::Result<()> {
+    let worse = baseline::worse(&baseline::read()?, now);
     ensure!(
         worse.is_empty(),
         "more instructions than the baseline (`--renew` if that is meant): {}",
         worse.join("; ")
     );
-    println!("no tick costs more than in the baseline");
     Ok(())
 }
 
@@ -103,23 +110,13 @@ fn dearest(table: &Table) -> u64 {
     table.values().map(|c| c.decision_most).max().unwrap_or(0)
 }
 
-fn missed(table: &Table) -> Vec<String> {
-    let mut missed = Vec::new();
-    let monitored = table
-        .get("monitored")
-        .map_or(u64::MAX, |c| c.decision_median);
-    if monitored > MONITORED_AT_MOST {
-        missed.push(format!(
-            "a monitored tick takes {monitored} instructions instead of {MONITORED_AT_MOST}"
-        ));
-    }
-    let any = dearest(table);
-    if any > ANY_AT_MOST {
-        missed.push(format!(
-            "the dearest tick takes {any} instructions instead of {ANY_AT_MOST}"
-        ));
-    }
-    missed
+/// What has a target, the target, and what was reached.
+fn targets(table: &Table) -> [(&'static str, u64, u64); 2] {
+    let monitored = table.get("monitored").map_or(0, |c| c.decision_median);
+    [
+        ("a monitored tick (median)", MONITORED_AT_MOST, monitored),
+        ("the dearest tick of all", ANY_AT_MOST, dearest(table)),
+    ]
 }
 
 /// Ticks of a session and hops of a message, alternating.
@@ -175,6 +172,10 @@ fn print(table: Option<&Table>, timed: &Timed) {
                     c.ticks, c.decision_median, c.decision_most, c.motion_median, c.motion_most
                 );
             }
+            for (what, target, reached) in targets(table) {
+                let verdict = if reached <= target { "met" } else { "MISSED" };
+                println!("{what}: {reached} of at most {target}: {verdict}");
+            }
         }
     }
     println!("\nTime, medians; ratio to one hop of 512 bytes between two cores by iceoryx2:");
@@ -210,13 +211,17 @@ fn measure(as_json: bool) -> anyhow::Result<()> {
             "recovery": times(&timed.recovery),
             "hop": times(&timed.hop),
         });
-        println!("{:#}", json!({ "instructions": table, "times": timed }));
+        let targets = table.as_ref().map(|table| {
+            targets(table).map(|(what, target, reached)| {
+                json!({ "what": what, "target": target, "reached": reached })
+            })
+        });
+        let found = json!({ "instructions": table, "targets": targets, "times": timed });
+        println!("{found:#}");
     } else {
         print(table.as_ref(), &timed);
     }
-    let missed = table.as_ref().map(missed).unwrap_or_default();
-    ensure!(missed.is_empty(), "{}", missed.join("; "));
-    Ok(())
+    table.as_ref().map_or(Ok(()), compare)
 }
 
 fn main() -> ExitCode {

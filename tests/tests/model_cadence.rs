@@ -3,9 +3,8 @@
 //! to be under way.
 
 use std::{
-    io,
     sync::{
-        Arc, Mutex,
+        Arc,
         atomic::{AtomicBool, Ordering::SeqCst},
     },
     thread,
@@ -25,36 +24,18 @@ use fitmac_rt::{
     clock,
     control_loop::LoopOptions,
     endpoint::{AgentsEndpoint, HarnessEndpoint},
-    frame::{Tick, contents},
+    frame::contents,
     instance::Instance,
     port::Session,
     realtime::RealTime,
     roles::{ControllerReport, ControllerRole, controller},
     signals::Signals,
-    telemetry::Consume,
     transport::Ipc,
 };
+use fitmac_tests::cell::Memory;
 
 /// Ticks that the controller makes while the call hangs.
 const TICKS: u64 = 500;
-
-#[derive(Clone, Default)]
-struct Memory(Arc<Mutex<Vec<Tick>>>);
-
-impl Consume for Memory {
-    fn tick(&mut self, tick: &Tick) -> io::Result<()> {
-        self.0.lock().expect("no panic").push(tick.clone());
-        Ok(())
-    }
-
-    fn finish(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn name(&self) -> String {
-        "memory".into()
-    }
-}
 
 fn bowl(y_m: f64) -> Detection {
     Detection {
@@ -162,7 +143,7 @@ fn ticks_go_on_while_a_model_hangs() {
     assert_eq!(server.asked().len(), 1);
     server.release();
 
-    let ticks = memory.0.lock().expect("no panic");
+    let ticks = memory.ticks();
     assert!(ticks.len() as u64 >= TICKS);
     assert_eq!(report.cadence.value("ticks"), Some(ticks.len() as u64));
     for (before, after) in ticks.iter().zip(&ticks[1..]) {

@@ -1,11 +1,7 @@
 //! Real time and lockstep are two ways to run the same core: for the same
 //! inputs at the same times they give the same answers, bit for bit.
 
-use std::{
-    io,
-    sync::{Arc, Mutex},
-    time::Duration,
-};
+use std::time::Duration;
 
 use fitmac_core::{Controller, Params, ValidParams, message::Output};
 use fitmac_rt::{
@@ -22,33 +18,16 @@ use fitmac_rt::{
     roles::{ControllerRole, controller},
     service,
     signals::Signals,
-    telemetry::Consume,
     transport::Lockstep,
 };
-use fitmac_tests::cell::{AgentsState, Peer, PolicyState, RobotState, agents, policy, robot};
+use fitmac_tests::cell::{
+    AgentsState, Memory, Peer, PolicyState, RobotState, agents, policy, robot,
+};
 
 fn params() -> ValidParams {
     let mut params = Params::guarded();
     params.clock.settle_steps = 0;
     params.validate().expect("valid")
-}
-
-#[derive(Clone, Default)]
-struct Memory(Arc<Mutex<Vec<Tick>>>);
-
-impl Consume for Memory {
-    fn tick(&mut self, tick: &Tick) -> io::Result<()> {
-        self.0.lock().expect("no panic").push(tick.clone());
-        Ok(())
-    }
-
-    fn finish(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn name(&self) -> String {
-        "memory".into()
-    }
 }
 
 /// An episode in wall-clock time on shared memory: the policy idles, until a
@@ -82,7 +61,7 @@ fn in_real_time() -> Vec<Tick> {
     let report = process.join().expect("no panic").expect("it started");
     assert_eq!(report.cadence.value("unrecorded_ticks"), Some(0));
     drop((robot, policy, agents));
-    let ticks = memory.0.lock().expect("no panic").clone();
+    let ticks = memory.ticks();
     assert_eq!(
         ticks.len() as u64,
         report.cadence.value("ticks").expect("a counter")

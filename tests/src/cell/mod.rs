@@ -7,11 +7,13 @@
 //! it becomes slow, never jumpy, so that distances have bounds everywhere.
 
 mod agents;
+mod memory;
 mod policy;
 mod robot;
 mod thread;
 
 pub use agents::{AgentsState, agents};
+pub use memory::Memory;
 pub use policy::{PolicyState, policy};
 pub use robot::{Moment, RobotState, Spoil, robot};
 pub use thread::{Peer, Shared};
