@@ -73,8 +73,8 @@ fn inv_27_time_alone_says_nothing_about_a_young_attempt() {
 }
 
 #[test]
-fn inv_30_what_the_critic_and_the_pose_age_add_changes_nothing() {
-    let noted = CRITIC_TARGET | CRITIC_EXECUTION | POSE_STALE | PROGRESS;
+fn inv_30_what_the_critic_adds_changes_nothing() {
+    let noted = CRITIC_TARGET | CRITIC_EXECUTION | PROGRESS;
     every_question(|q| {
         let without = Question {
             evidence: q.evidence & !noted,
@@ -111,7 +111,12 @@ fn the_sets_of_evidence_are_disjoint_and_the_strong_ones_count() {
     assert_eq!(WRONG_OBJECT & (TARGET | EXECUTION), 0);
     assert_eq!(STRONG & !(TARGET | EXECUTION | WRONG_OBJECT), 0);
     assert_eq!(STRONG & TIME_BASED, 0, "time alone is never strong");
-    assert_eq!(ALL.len(), BITS as usize, "the tests above know every bit");
+    let highest = ALL.iter().map(|&(bit, _)| bit).max();
+    assert_eq!(
+        highest,
+        Some(1 << (BITS - 1)),
+        "the tests above know every bit"
+    );
 }
 
 #[test]

@@ -159,12 +159,6 @@ impl ChunkIntake {
         Some((&self.latest, consumed as usize))
     }
 
-    /// True if a chunk is at hand.
-    #[must_use]
-    pub const fn is_ready(&self) -> bool {
-        matches!(self.answer, Answer::Ready { .. })
-    }
-
     pub(crate) fn step(&mut self, params: &Params, now_ns: u64, chunk: &ActionChunk) -> Outcome {
         match self.examine(params, now_ns, chunk) {
             Ok(played) => {

@@ -2,8 +2,9 @@
 //! if the test fails.
 
 use super::{
-    Flow, Scene,
+    active::Flow,
     geometry::{Side, better_side, grasp_point, levelling, path_top},
+    scene::Scene,
     waypoint::{Grip, Motion},
 };
 use crate::{

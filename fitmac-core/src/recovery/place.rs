@@ -4,8 +4,9 @@
 use kinematics::vector::{self, Vector3};
 
 use super::{
-    Flow, Scene,
+    active::Flow,
     geometry::path_top,
+    scene::Scene,
     waypoint::{Grip, Motion},
 };
 use crate::{
