@@ -1,6 +1,8 @@
 //! D. The monitor, in the loop. Its equations are checked in the core's own
 //! tests, beside the code.
 
+use core::fmt::Debug;
+
 use fitmac_core::{
     Controller, Params,
     evidence::{PROGRESS, STALL},
@@ -29,6 +31,11 @@ fn decided(run: &Session) -> Vec<(u64, u64, u8, u8, u8, u8)> {
     run.queries.iter().map(key).collect()
 }
 
+/// As text, so that a NaN equals itself.
+fn text(value: &impl Debug) -> String {
+    format!("{value:?}")
+}
+
 #[test]
 fn inv_40_a_repeated_input_changes_nothing() {
     for seed in 0..60 {
@@ -39,7 +46,8 @@ fn inv_40_a_repeated_input_changes_nothing() {
             let told = swarm.tick();
             let active = twice.state().subtask().index();
             let output = controller.tick(told.now_ns, &told.input());
-            twice.tick(told.now_ns, &told.input());
+            let first = twice.tick(told.now_ns, &told.input());
+            assert_eq!(text(&first.trace), text(&output.trace), "seed {seed}");
             // The same messages once more, except for what is an order, and for a report on
             // another subtask than the active one: it was not heard, and may be now.
             let mut again = told.clone();
@@ -47,7 +55,9 @@ fn inv_40_a_repeated_input_changes_nothing() {
             again.verifier = again.verifier.filter(|report| report.subtask == active);
             again.critic = again.critic.filter(|report| report.subtask == active);
             let repeated = twice.tick(told.now_ns, &again.input());
-            assert_eq!(repeated.query.map(|q| q.query_id), None, "seed {seed}");
+            assert_eq!(repeated.query, None, "seed {seed}");
+            assert_eq!(repeated.rebind, None, "seed {seed}");
+            assert_eq!(repeated.trace, None, "seed {seed}");
             let (a, b) = (controller.state(), twice.state());
             assert_eq!(a.action(), b.action(), "seed {seed}");
             assert_eq!(a.decision(), b.decision(), "seed {seed}");
@@ -57,6 +67,39 @@ fn inv_40_a_repeated_input_changes_nothing() {
             swarm.hear(&output);
         }
     }
+}
+
+#[test]
+fn inv_40_a_sample_heard_again_later_is_as_good_as_none() {
+    let mut repeats = 0;
+    for seed in 0..150 {
+        let mut swarm = Swarm::new(seed);
+        let mut silent = Controller::new(swarm.params);
+        let mut echoed = silent.clone();
+        let mut newest = None;
+        for _ in 0..800 {
+            let told = swarm.tick();
+            let mut again = told.clone();
+            if told.request != 0 || told.plan.is_some() {
+                // A new episode: numbers may begin anew, and an old sample would be a new one.
+                newest = None;
+            } else if told.state.is_none() {
+                again.state = newest;
+                repeats += u32::from(newest.is_some());
+            }
+            let refused = silent.state().refusals().clone();
+            let output = silent.tick(told.now_ns, &told.input());
+            let echo = echoed.tick(told.now_ns, &again.input());
+            assert_eq!(text(&echo), text(&output), "seed {seed}");
+            if told.state.is_some() {
+                let taken = *silent.state().refusals() == refused;
+                newest = told.state.filter(|_| taken);
+            }
+            swarm.hear(&output);
+        }
+        assert_eq!(echoed.state(), silent.state(), "seed {seed}");
+    }
+    assert!(repeats > 2000, "{repeats}");
 }
 
 #[test]
