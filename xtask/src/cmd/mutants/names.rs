@@ -14,21 +14,37 @@ pub(crate) struct Mutant {
     line: usize,
     column: usize,
     change: String,
+    /// Line and column behind the text that is replaced, from 1.
+    end: (usize, usize),
+    /// What stands there instead.
+    replacement: String,
 }
 
 impl Mutant {
-    /// Reads a name.
-    pub(super) fn parse(name: &str) -> Option<Self> {
-        let (place, change) = name.split_once(": ")?;
+    /// Reads an entry of the list that `cargo mutants --list --json` prints.
+    pub(super) fn read(entry: &serde_json::Value) -> Option<Self> {
+        let (place, change) = entry.get("name")?.as_str()?.split_once(": ")?;
         let mut parts = place.rsplitn(3, ':');
         let column = parts.next()?.parse().ok()?;
         let line = parts.next()?.parse().ok()?;
+        let end = entry.get("span")?.get("end")?;
+        let number = |key: &str| usize::try_from(end.get(key)?.as_u64()?).ok();
         Some(Self {
             file: parts.next()?.to_owned(),
             line,
             column,
             change: change.trim_end().to_owned(),
+            end: (number("line")?, number("column")?),
+            replacement: entry.get("replacement")?.as_str()?.to_owned(),
         })
+    }
+
+    /// The file's text with the change made.
+    pub(super) fn apply(&self, text: &str) -> Option<String> {
+        let from = offset(text, (self.line, self.column))?;
+        let to = offset(text, self.end)?;
+        let (before, behind) = (text.get(..from)?, text.get(to.max(from)..)?);
+        Some(format!("{before}{}{behind}", self.replacement))
     }
 
     /// The name again.
@@ -38,6 +54,7 @@ impl Mutant {
             line,
             column,
             change,
+            ..
         } = self;
         format!("{file}:{line}:{column}: {change}")
     }
@@ -77,6 +94,17 @@ impl Mutant {
             line: line.unwrap_or_default().trim().to_owned(),
         }
     }
+}
+
+/// The byte at this line and column, both from 1.
+fn offset(text: &str, (line, column): (usize, usize)) -> Option<usize> {
+    let mut start = 0;
+    for _ in 1..line {
+        start += text.get(start..)?.find('\n')? + 1;
+    }
+    let rest = text.get(start..)?.char_indices().map(|(at, _)| at);
+    let mut places = rest.chain([text.len() - start]);
+    Some(start + places.nth(column.checked_sub(1)?)?)
 }
 
 /// A file below the core's source.
@@ -139,10 +167,18 @@ impl Key {
 mod tests {
     use super::*;
 
+    fn mutant(name: &str, end: (usize, usize), replacement: &str) -> Option<Mutant> {
+        Mutant::read(&serde_json::json!({
+            "name": name,
+            "span": {"end": {"line": end.0, "column": end.1}},
+            "replacement": replacement,
+        }))
+    }
+
     #[test]
     fn a_name_is_read_and_written() {
         let name = "fitmac-core/src/lock.rs:49:9: replace A::b -> Result<(), C> with Ok(())";
-        let mutant = Mutant::parse(name).expect("a name");
+        let mutant = mutant(name, (50, 3), "Ok(())").expect("a name");
         assert_eq!(mutant.name(), name);
         assert_eq!(mutant.short_file(), "lock.rs");
         assert_eq!((mutant.line, mutant.column), (49, 9));
@@ -150,6 +186,20 @@ mod tests {
             mutant.pattern(),
             r"^fitmac\-core\/src\/lock\.rs:49:9: replace A::b \-> Result<\(\)\, C> with Ok\(\(\)\)$"
         );
-        assert_eq!(Mutant::parse("ok"), None);
+        assert_eq!(Mutant::read(&serde_json::json!({"name": "ok"})), None);
+    }
+
+    #[test]
+    fn a_change_is_made_where_it_belongs() {
+        let text = "fn a() {\n    µ(1 + 2)\n}\n";
+        let plus = mutant("a.rs:2:9: replace + with -", (2, 10), "-").expect("a name");
+        assert_eq!(
+            plus.apply(text).as_deref(),
+            Some("fn a() {\n    µ(1 - 2)\n}\n")
+        );
+        let body = mutant("a.rs:1:8: replace a", (3, 2), "{}").expect("a name");
+        assert_eq!(body.apply(text).as_deref(), Some("fn a() {}\n"));
+        let beyond = mutant("a.rs:7:1: replace a", (7, 2), "").expect("a name");
+        assert_eq!(beyond.apply(text), None);
     }
 }

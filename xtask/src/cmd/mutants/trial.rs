@@ -1,4 +1,4 @@
-//! Tries mutants in copies of the checkout.
+//! Tries mutants in copies of the checkout, by cargo-mutants and in the quick way.
 
 use std::{
     collections::BTreeSet,
@@ -9,7 +9,10 @@ use std::{
 
 use anyhow::{Context, bail};
 
-use super::names::Mutant;
+use super::{
+    names::Mutant,
+    shared::{Runs, Shared},
+};
 use crate::{
     process::{self, step},
     tool,
@@ -19,26 +22,11 @@ use crate::{
 const NAME: &str = "cargo-mutants";
 const VERSION: &str = "27.1.0";
 
-/// First what notices most within a second; then, for what is left, every test of the core.
-const STAGES: [Stage; 2] = [
-    Stage {
-        packages: "fitmac-core-tests",
-        arguments: &["--test=all", "--", "quick", "recoveries", "table_19"],
-    },
-    Stage {
-        packages: "fitmac-core,fitmac-core-tests",
-        arguments: &["--lib", "--test=all"],
-    },
-];
+/// Where the core's tests are that stand beside its code.
+const PACKAGE: &str = "fitmac-core";
 
-/// Longest that a stage's tests may take on a busy machine, s.
+/// Longest that the tests may take on a busy machine, s.
 const TIMEOUT_S: &str = "300";
-
-#[derive(Clone, Copy)]
-struct Stage {
-    packages: &'static str,
-    arguments: &'static [&'static str],
-}
 
 /// What came out.
 #[derive(Default)]
@@ -49,10 +37,21 @@ pub(super) struct Outcome {
     pub(super) survivors: Vec<Mutant>,
 }
 
+impl Outcome {
+    /// Adds what came out of another try of its survivors, which alone may still survive.
+    fn go_on(&mut self, more: Self) {
+        self.caught += more.caught;
+        self.timeouts += more.timeouts;
+        self.unviable += more.unviable;
+        self.survivors = more.survivors;
+    }
+}
+
 /// The copies, ready.
 pub(super) struct Trial {
     program: PathBuf,
     trees: Vec<PathBuf>,
+    shared: Shared,
 }
 
 impl Trial {
@@ -63,24 +62,25 @@ impl Trial {
         let mut trees = Vec::new();
         for job in 0..jobs {
             let tree = home.join(format!("tree-{job}"));
-            copy(workspace.root(), &tree)?;
+            copy(workspace.root(), &tree, |_, text| text)?;
             step(&format!(
                 "The tests without a mutant (copy {} of {jobs})",
                 job + 1
             ));
-            for stage in STAGES {
-                let mut test = process::cargo(workspace);
-                test.current_dir(&tree)
-                    .args(["test", "--quiet", "--profile=mutants"]);
-                for package in stage.packages.split(',') {
-                    test.args(["--package", package]);
-                }
-                test.args(stage.arguments).stdout(Stdio::null());
-                process::run(&mut test).context("the tests fail without a mutant")?;
-            }
+            let mut test = process::cargo(workspace);
+            test.current_dir(&tree)
+                .args(["test", "--quiet", "--profile=mutants", "--lib"])
+                .args(["--package", PACKAGE])
+                .stdout(Stdio::null());
+            process::run(&mut test).context("the tests fail without a mutant")?;
             trees.push(tree);
         }
-        Ok(Self { program, trees })
+        let shared = Shared::new(workspace, jobs)?;
+        Ok(Self {
+            program,
+            trees,
+            shared,
+        })
     }
 
     /// All mutants of the core, or those that a diff touches.
@@ -90,6 +90,7 @@ impl Trial {
             .args([
                 "mutants",
                 "--list",
+                "--json",
                 "--colors=never",
                 "--package=fitmac-core",
             ])
@@ -109,34 +110,36 @@ impl Trial {
         if !output.status.success() {
             bail!("cargo-mutants cannot list the mutants (see above)");
         }
-        let text = String::from_utf8_lossy(&output.stdout).into_owned();
-        Ok(text.lines().filter_map(Mutant::parse).collect())
+        // Without any mutant the list is empty text.
+        if output.stdout.iter().all(u8::is_ascii_whitespace) {
+            return Ok(Vec::new());
+        }
+        let list: Vec<serde_json::Value> =
+            serde_json::from_slice(&output.stdout).context("cargo-mutants' list is no JSON")?;
+        let read = |entry| {
+            Mutant::read(entry).with_context(|| format!("cargo-mutants lists a mutant as {entry}"))
+        };
+        list.iter().map(read).collect()
     }
 
-    /// Tries these.
+    /// Tries these: against the tests that notice most, against those beside the code, against
+    /// the rest.
     pub(super) fn run(&self, mutants: &[&Mutant]) -> anyhow::Result<Outcome> {
-        let mut outcome = Outcome::default();
-        let mut left: Vec<Mutant> = mutants.iter().map(|m| (*m).clone()).collect();
-        for stage in STAGES {
-            if left.is_empty() {
-                break;
-            }
-            let tried = self.stage(stage, &left)?;
-            outcome.caught += tried.caught;
-            outcome.timeouts += tried.timeouts;
-            outcome.unviable += tried.unviable;
-            left = tried.survivors;
-        }
-        outcome.survivors = left;
+        let mut outcome = self.shared.run(Runs::Quick, mutants)?;
+        let left = outcome.survivors.clone();
+        outcome.go_on(self.beside(&left)?);
+        let left = outcome.survivors.clone();
+        let left: Vec<&Mutant> = left.iter().collect();
+        outcome.go_on(self.shared.run(Runs::Rest, &left)?);
         Ok(outcome)
     }
 
-    /// Tries these against the tests of one stage; each copy takes its share.
-    fn stage(&self, stage: Stage, mutants: &[Mutant]) -> anyhow::Result<Outcome> {
+    /// Tries these against the tests beside the code; each copy takes its share.
+    fn beside(&self, mutants: &[Mutant]) -> anyhow::Result<Outcome> {
         let mut children = Vec::new();
         let share = mutants.len().div_ceil(self.trees.len()).max(1);
         for (tree, share) in self.trees.iter().zip(mutants.chunks(share)) {
-            let child = self.start(stage, tree, share)?;
+            let child = self.start(tree, share)?;
             children.push((tree, child));
         }
         let mut outcome = Outcome::default();
@@ -146,16 +149,16 @@ impl Trial {
             if !matches!(status.code(), Some(0 | 2 | 3)) {
                 bail!("cargo-mutants ended with {status} (see above)");
             }
-            let names = |list: &str| -> anyhow::Result<Vec<Mutant>> {
-                let mut names = read(tree, list)?;
+            let named = |list: &str| -> anyhow::Result<Vec<Mutant>> {
+                let names = read(tree, list)?;
                 // Version 27.1.0 lets `delete field` pass every `--re`.
-                names.retain(|name| mutants.contains(name));
-                Ok(names)
+                let ours = mutants.iter().filter(|m| names.contains(&m.name()));
+                Ok(ours.cloned().collect())
             };
-            outcome.caught += names("caught")?.len();
-            outcome.timeouts += names("timeout")?.len();
-            outcome.unviable += names("unviable")?.len();
-            outcome.survivors.extend(names("missed")?);
+            outcome.caught += named("caught")?.len();
+            outcome.timeouts += named("timeout")?.len();
+            outcome.unviable += named("unviable")?.len();
+            outcome.survivors.extend(named("missed")?);
         }
         let tried = outcome.caught + outcome.timeouts + outcome.unviable + outcome.survivors.len();
         if tried != mutants.len() {
@@ -164,19 +167,14 @@ impl Trial {
         Ok(outcome)
     }
 
-    fn start(
-        &self,
-        stage: Stage,
-        tree: &Path,
-        mutants: &[Mutant],
-    ) -> anyhow::Result<std::process::Child> {
+    fn start(&self, tree: &Path, mutants: &[Mutant]) -> anyhow::Result<std::process::Child> {
         let _none_yet = fs::remove_dir_all(tree.join("mutants.out"));
         let mut command = Command::new(&self.program);
         command
             .args(["mutants", "--in-place", "--baseline=skip", "--colors=never"])
             .args(["--package=fitmac-core", "--profile=mutants"])
             .args(["--timeout", TIMEOUT_S, "--build-timeout", TIMEOUT_S])
-            .args(["--test-package", stage.packages]);
+            .args(["--test-package", PACKAGE]);
         let files: BTreeSet<_> = mutants.iter().map(Mutant::file).collect();
         for file in files {
             command.args(["--file", file]);
@@ -185,8 +183,7 @@ impl Trial {
             command.args(["--re", &mutant.pattern()]);
         }
         command
-            .arg("--")
-            .args(stage.arguments)
+            .args(["--", "--lib"])
             .current_dir(tree)
             .env_remove("CARGO_TARGET_DIR")
             .env_remove("RUSTFLAGS")
@@ -198,16 +195,24 @@ impl Trial {
     }
 }
 
-fn read(tree: &Path, list: &str) -> anyhow::Result<Vec<Mutant>> {
+/// The names on one of cargo-mutants' lists.
+fn read(tree: &Path, list: &str) -> anyhow::Result<BTreeSet<String>> {
     let path = tree.join(format!("mutants.out/{list}.txt"));
     let text =
         fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()))?;
-    Ok(text.lines().filter_map(Mutant::parse).collect())
+    Ok(text
+        .lines()
+        .map(|name| name.trim_end().to_owned())
+        .collect())
 }
 
 /// Copies what git knows or would add, so that a mutant never touches the checkout itself. What is
-/// the same stays untouched, and so need not be compiled again.
-fn copy(from: &Path, to: &Path) -> anyhow::Result<()> {
+/// the same stays untouched, and so need not be compiled again. `edit` may change a file's text.
+pub(super) fn copy(
+    from: &Path,
+    to: &Path,
+    edit: impl Fn(&str, Vec<u8>) -> Vec<u8>,
+) -> anyhow::Result<()> {
     let mut git = Command::new("git");
     git.args([
         "ls-files",
@@ -227,9 +232,10 @@ fn copy(from: &Path, to: &Path) -> anyhow::Result<()> {
     let files: BTreeSet<&str> = text.split('\0').filter(|f| !f.is_empty()).collect();
     for file in &files {
         // A file that git knows may be gone.
-        let Ok(wanted) = fs::read(from.join(file)) else {
+        let Ok(text) = fs::read(from.join(file)) else {
             continue;
         };
+        let wanted = edit(file, text);
         let target = to.join(file);
         if fs::read(&target).is_ok_and(|found| found == wanted) {
             continue;
