@@ -338,3 +338,6 @@ pub fn in_region(signals: &Signals) -> Option<bool> {
     };
     Some(inside && level)
 }
+
+#[cfg(test)]
+mod tests;

@@ -168,3 +168,6 @@ impl Commanded {
         )
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -50,6 +50,8 @@ pub mod recovery;
 pub mod route;
 pub mod shaping;
 pub mod signals;
+#[cfg(test)]
+mod stand;
 pub mod subtask;
 pub mod trace;
 pub mod tracking;

@@ -270,3 +270,6 @@ pub fn geometric_score(params: &LockParams, ee_m: [f64; 3], candidate_m: [f64; 3
     let [dx, dy, dz] = vector::sub(candidate_m, ee_m);
     vector::norm([dx, dy, 0.0]) + params.lambda_z * dz.abs()
 }
+
+#[cfg(test)]
+mod tests;

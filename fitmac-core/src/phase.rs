@@ -280,3 +280,6 @@ impl PhaseEstimator {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -123,3 +123,6 @@ fn decode(params: &Params, raw: [f32; ACTION_DIM]) -> PolicyAction {
     }
     PolicyAction { action, clamped }
 }
+
+#[cfg(test)]
+mod tests;

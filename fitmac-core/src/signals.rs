@@ -371,3 +371,6 @@ fn nearest_other(
     }
     nearest
 }
+
+#[cfg(test)]
+mod tests;

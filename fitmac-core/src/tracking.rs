@@ -203,3 +203,6 @@ impl Tracking {
         later.map(|at| at.ee_m)
     }
 }
+
+#[cfg(test)]
+mod tests;

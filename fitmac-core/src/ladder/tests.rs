@@ -151,3 +151,33 @@ fn the_table_goes_from_mild_to_severe_and_names_each_reaction_once() {
         }
     }
 }
+
+#[test]
+fn what_is_noticed_in_two_ways_is_told() {
+    let params = Params::guarded();
+    let faults = Faults {
+        noticed: reason::STATE_STALE | reason::STATE_REFUSED,
+        state_age_ns: Some(ms_to_ns(params.state.hold_age_ms) + 1),
+        waiting_ns: None,
+        chunks_accepted: 1,
+        chunks_refused: 0,
+        unapplied_ns: 0,
+        suspended: false,
+        stop_asked: false,
+    };
+    let told = reason::STATE_STALE | reason::STATE_REFUSED;
+    let found = Ladder::new().step(&params, &faults);
+    assert_eq!(found, (Mode::Hold, told));
+}
+
+#[test]
+fn a_robot_that_names_no_command_is_not_judged() {
+    let mut applied = Applied::new();
+    applied.note(1_000, 0);
+    assert_eq!(applied.standing_ns(9_000), 0);
+    applied.note(2_000, 7);
+    applied.note(3_000, 7);
+    assert_eq!(applied.standing_ns(9_000), 7_000);
+    applied.note(4_000, 8);
+    assert_eq!(applied.standing_ns(9_000), 5_000);
+}

@@ -233,3 +233,66 @@ fn patience_and_time_out_are_looked_up_by_phase() {
     ];
     assert_eq!(found, expected);
 }
+
+#[test]
+fn a_history_is_empty_until_a_step_was_noted_and_no_longer_once_it_is_forgotten() {
+    let mut monitor = Monitor::new();
+    assert!(monitor.history().is_empty());
+    let seen = signals(&Seen {
+        ee: 0.0,
+        object: None,
+        destination: false,
+    });
+    monitor.step(&Params::guarded(), Phase::Approach, 1, &seen);
+    assert!(!monitor.history().is_empty());
+    monitor.forget();
+    assert!(monitor.history().is_empty());
+}
+
+/// Whether a step from the first to the second is progress; the limits are a quarter of a metre.
+fn is_progress(phase: Phase, then: &Signals, now: &Signals) -> bool {
+    let mut params = Params::guarded();
+    params.progress.delta_steps = 1;
+    params.progress.target_m = 0.25;
+    params.progress.end_effector_m = 0.25;
+    params.progress.destination_m = 0.25;
+    params.progress.object_m = 0.25;
+    let mut monitor = Monitor::new();
+    monitor.step(&params, phase, 1, then);
+    monitor.step(&params, phase, 2, now) & evidence::PROGRESS != 0
+}
+
+#[test]
+fn progress_is_more_than_the_limit() {
+    let at = |ee: f64, away: f64, object: f64, left: f64| {
+        let mut signals = signals(&Seen {
+            ee,
+            object: Some(object),
+            destination: true,
+        });
+        if let (Some(t), Some(d)) = (&mut signals.target, &mut signals.destination) {
+            t.distance_m = away;
+            d.distance_m = left;
+        }
+        signals
+    };
+    let start = at(0.0, 1.0, 0.0, 1.0);
+    let more = 0.251;
+    for phase in [Phase::Approach, Phase::Grasp, Phase::Lift] {
+        let progress = |now| is_progress(phase, &start, &now);
+        assert!(!progress(at(0.25, 0.75, 1.0, 0.0)), "{phase}");
+        assert!(progress(at(more, 1.0, 0.0, 1.0)), "{phase}: the hand moved");
+        assert!(progress(at(0.0, 1.0 - more, 0.0, 1.0)), "{phase}: nearer");
+    }
+    for phase in [
+        Phase::Transport,
+        Phase::Descend,
+        Phase::Release,
+        Phase::Stabilise,
+    ] {
+        let progress = |now| is_progress(phase, &start, &now);
+        assert!(!progress(at(1.0, 0.0, 0.25, 0.75)), "{phase}");
+        assert!(progress(at(0.0, 1.0, more, 1.0)), "{phase}: it moved");
+        assert!(progress(at(0.0, 1.0, 0.0, 1.0 - more)), "{phase}: nearer");
+    }
+}
