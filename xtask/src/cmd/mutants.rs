@@ -1,13 +1,13 @@
 //! `cargo xtask mutants`: every small change of the core must be noticed by a test.
 //!
-//! cargo-mutants makes the changes. They are tried in a copy of the checkout (`out/mutants`), file
+//! cargo-mutants lists the changes. They are tried in a copy of the checkout (`out/mutants`), file
 //! by file; what came out of a file is on record in `tests/core/mutants/tried.toml`, so that the
 //! next run goes on where this one ended, and tries a file anew once its text has changed.
 //! `tests/core/mutants/survivors.toml` lists, with reasons, the mutants that may survive.
 
+mod copy;
 mod names;
 mod record;
-mod shared;
 mod trial;
 
 use std::{collections::BTreeMap, fs, path::Path};
@@ -103,9 +103,6 @@ pub(crate) fn run(workspace: &Workspace, args: &Args) -> anyhow::Result<()> {
         ));
         let outcome = trial.run(todo)?;
         record.note(root, file, &outcome)?;
-        for site in open(root, &outcome.survivors, &explained)? {
-            eprintln!("survives: {}", site.mutant.name());
-        }
     }
     judge(&record, root, &explained, Some(&mutants))
 }

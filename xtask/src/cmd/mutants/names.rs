@@ -59,22 +59,6 @@ impl Mutant {
         format!("{file}:{line}:{column}: {change}")
     }
 
-    /// A regular expression that matches just this name.
-    pub(super) fn pattern(&self) -> String {
-        let mut pattern = String::from("^");
-        for c in self.name().chars() {
-            if c.is_ascii_punctuation() {
-                pattern.push('\\');
-            }
-            pattern.push(c);
-        }
-        pattern
-            .replace("\\:", ":")
-            .replace("\\<", "<")
-            .replace("\\>", ">")
-            + "$"
-    }
-
     /// The file, from the workspace's root.
     pub(super) fn file(&self) -> &str {
         &self.file
@@ -182,10 +166,6 @@ mod tests {
         assert_eq!(mutant.name(), name);
         assert_eq!(mutant.short_file(), "lock.rs");
         assert_eq!((mutant.line, mutant.column), (49, 9));
-        assert_eq!(
-            mutant.pattern(),
-            r"^fitmac\-core\/src\/lock\.rs:49:9: replace A::b \-> Result<\(\)\, C> with Ok\(\(\)\)$"
-        );
         assert_eq!(Mutant::read(&serde_json::json!({"name": "ok"})), None);
     }
 

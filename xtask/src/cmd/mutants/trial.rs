@@ -1,20 +1,31 @@
-//! Tries mutants in copies of the checkout, by cargo-mutants and in the quick way.
+//! Tries mutants: one build of the core and a run or two of ready tests for each.
+//!
+//! As a part of the tests' program the core would take them along: whatever changes in it, they
+//! would be compiled and linked anew, which takes five times as long as the core alone. So in a
+//! copy of the checkout the core is a shared library, the tests are linked to it once, and the
+//! same program runs with the library of each mutant. (What the tests' compiler took over from the
+//! core, the value of a constant say, stays the original's; the core has no function that is
+//! generic or inlined into its tests.)
 
 use std::{
-    collections::BTreeSet,
     fs,
     path::{Path, PathBuf},
-    process::{Command, Stdio},
+    process::{Command, ExitStatus, Output, Stdio},
+    sync::{
+        Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread,
 };
 
 use anyhow::{Context, bail};
 
 use super::{
-    names::Mutant,
-    shared::{Runs, Shared},
+    copy::copy,
+    names::{Mutant, SOURCE},
 };
 use crate::{
-    process::{self, step},
+    process::step,
     tool,
     workspace::{Workspace, not_writable},
 };
@@ -22,11 +33,18 @@ use crate::{
 const NAME: &str = "cargo-mutants";
 const VERSION: &str = "27.1.0";
 
-/// Where the core's tests are that stand beside its code.
-const PACKAGE: &str = "fitmac-core";
-
-/// Longest that the tests may take on a busy machine, s.
-const TIMEOUT_S: &str = "300";
+/// Arguments of the test program, one run each, what notices most in the least time first. The
+/// swarm and the raw bytes are left out: they look for broken invariants only, and need many ticks
+/// for it.
+const FIRST: [&[&str]; 2] = [
+    &["quick::"],
+    &["recoveries::", "table_19::", "edges::", "profiles::"],
+];
+const LAST: [&[&str]; 2] = [&["soak::"], &["invariants::"]];
+/// Longest that a run may take on a busy machine, s: some twenty times what it takes.
+const LATE_S: &str = "240";
+/// Most memory of a run, KiB: a loop without an end must not take the machine along.
+const MEMORY_KIB: &str = "8000000";
 
 /// What came out.
 #[derive(Default)]
@@ -37,74 +55,54 @@ pub(super) struct Outcome {
     pub(super) survivors: Vec<Mutant>,
 }
 
-impl Outcome {
-    /// Adds what came out of another try of its survivors, which alone may still survive.
-    fn go_on(&mut self, more: Self) {
-        self.caught += more.caught;
-        self.timeouts += more.timeouts;
-        self.unviable += more.unviable;
-        self.survivors = more.survivors;
-    }
-}
-
-/// The copies, ready.
+/// The copies of the checkout, ready.
 pub(super) struct Trial {
     program: PathBuf,
-    trees: Vec<PathBuf>,
-    shared: Shared,
+    copies: Vec<Copy>,
 }
 
 impl Trial {
-    /// Installs the tool, copies the checkout, and sees that the tests pass as it is.
+    /// Installs the tool, copies the checkout, builds, and sees that the tests pass as it is.
     pub(super) fn new(workspace: &Workspace, jobs: u32) -> anyhow::Result<Self> {
         let program = tool::install(workspace, NAME, VERSION)?.join(NAME);
         let home = workspace.root().join("out/mutants");
-        let mut trees = Vec::new();
+        let mut copies = Vec::new();
         for job in 0..jobs {
             let tree = home.join(format!("tree-{job}"));
-            copy(workspace.root(), &tree, |_, text| text)?;
+            copy(workspace.root(), &tree, shared)?;
+            let number = job + 1;
             step(&format!(
-                "The tests without a mutant (copy {} of {jobs})",
-                job + 1
+                "The tests without a mutant (copy {number} of {jobs})"
             ));
-            let mut test = process::cargo(workspace);
-            test.current_dir(&tree)
-                .args(["test", "--quiet", "--profile=mutants", "--lib"])
-                .args(["--package", PACKAGE])
-                .stdout(Stdio::null());
-            process::run(&mut test).context("the tests fail without a mutant")?;
-            trees.push(tree);
+            let copy = Copy::build(tree)?;
+            let runs = FIRST.iter().chain(&LAST).map(|run| copy.run(run));
+            for status in runs.chain([copy.run_beside("")]) {
+                if !status?.success() {
+                    bail!("the tests fail without a mutant");
+                }
+            }
+            copies.push(copy);
         }
-        let shared = Shared::new(workspace, jobs)?;
-        Ok(Self {
-            program,
-            trees,
-            shared,
-        })
+        Ok(Self { program, copies })
     }
 
     /// All mutants of the core, or those that a diff touches.
     pub(super) fn list(&self, in_diff: Option<&Path>) -> anyhow::Result<Vec<Mutant>> {
         let mut command = Command::new(&self.program);
         command
-            .args([
-                "mutants",
-                "--list",
-                "--json",
-                "--colors=never",
-                "--package=fitmac-core",
-            ])
+            .args(["mutants", "--list", "--json", "--colors=never"])
+            .arg("--package=fitmac-core")
             .stderr(Stdio::inherit());
         if let Some(diff) = in_diff {
             let diff = fs::canonicalize(diff)
                 .with_context(|| format!("--in-diff {} cannot be read", diff.display()))?;
             command.arg("--in-diff").arg(diff);
         }
-        let Some(tree) = self.trees.first() else {
+        let Some(copy) = self.copies.first() else {
             bail!("--jobs is 0: it must be at least 1");
         };
         let output = command
-            .current_dir(tree)
+            .current_dir(&copy.tree)
             .output()
             .context("cargo-mutants could not be started")?;
         if !output.status.success() {
@@ -122,133 +120,271 @@ impl Trial {
         list.iter().map(read).collect()
     }
 
-    /// Tries these: against the tests that notice most, against those beside the code, against
-    /// the rest.
+    /// Tries these, side by side in the copies.
     pub(super) fn run(&self, mutants: &[&Mutant]) -> anyhow::Result<Outcome> {
-        let mut outcome = self.shared.run(Runs::Quick, mutants)?;
-        let left = outcome.survivors.clone();
-        outcome.go_on(self.beside(&left)?);
-        let left = outcome.survivors.clone();
-        let left: Vec<&Mutant> = left.iter().collect();
-        outcome.go_on(self.shared.run(Runs::Rest, &left)?);
-        Ok(outcome)
-    }
-
-    /// Tries these against the tests beside the code; each copy takes its share.
-    fn beside(&self, mutants: &[Mutant]) -> anyhow::Result<Outcome> {
-        let mut children = Vec::new();
-        let share = mutants.len().div_ceil(self.trees.len()).max(1);
-        for (tree, share) in self.trees.iter().zip(mutants.chunks(share)) {
-            let child = self.start(tree, share)?;
-            children.push((tree, child));
-        }
-        let mut outcome = Outcome::default();
-        for (tree, mut child) in children {
-            let status = child.wait().context("waiting for cargo-mutants")?;
-            // 2: some survived; 3: some took too long.
-            if !matches!(status.code(), Some(0 | 2 | 3)) {
-                bail!("cargo-mutants ended with {status} (see above)");
+        let (next, outcome) = (AtomicUsize::new(0), Mutex::new(Outcome::default()));
+        let work = |copy: &Copy| -> anyhow::Result<()> {
+            while let Some(mutant) = mutants.get(next.fetch_add(1, Ordering::Relaxed)) {
+                let fate = copy.attempt(mutant)?;
+                let mut outcome = outcome.lock().unwrap_or_else(|e| e.into_inner());
+                match fate {
+                    Fate::Caught => outcome.caught += 1,
+                    Fate::Late => outcome.timeouts += 1,
+                    Fate::Unviable => outcome.unviable += 1,
+                    Fate::Survives => outcome.survivors.push((*mutant).clone()),
+                    Fate::NotRun => bail!("{}: the tests do not run", mutant.name()),
+                }
             }
-            let named = |list: &str| -> anyhow::Result<Vec<Mutant>> {
-                let names = read(tree, list)?;
-                // Version 27.1.0 lets `delete field` pass every `--re`.
-                let ours = mutants.iter().filter(|m| names.contains(&m.name()));
-                Ok(ours.cloned().collect())
-            };
-            outcome.caught += named("caught")?.len();
-            outcome.timeouts += named("timeout")?.len();
-            outcome.unviable += named("unviable")?.len();
-            outcome.survivors.extend(named("missed")?);
-        }
-        let tried = outcome.caught + outcome.timeouts + outcome.unviable + outcome.survivors.len();
-        if tried != mutants.len() {
-            bail!("cargo-mutants tried {tried} mutants of {}", mutants.len());
-        }
+            Ok(())
+        };
+        thread::scope(|scope| {
+            let copies = self.copies.iter();
+            let threads: Vec<_> = copies.map(|copy| scope.spawn(|| work(copy))).collect();
+            threads.into_iter().try_for_each(|thread| {
+                let result = thread.join();
+                result.unwrap_or_else(|_| bail!("a thread that tries mutants panicked"))
+            })
+        })?;
+        let mut outcome = outcome.into_inner().unwrap_or_else(|e| e.into_inner());
+        outcome.survivors.sort();
         Ok(outcome)
     }
+}
 
-    fn start(&self, tree: &Path, mutants: &[Mutant]) -> anyhow::Result<std::process::Child> {
-        let _none_yet = fs::remove_dir_all(tree.join("mutants.out"));
-        let mut command = Command::new(&self.program);
-        command
-            .args(["mutants", "--in-place", "--baseline=skip", "--colors=never"])
-            .args(["--package=fitmac-core", "--profile=mutants"])
-            .args(["--timeout", TIMEOUT_S, "--build-timeout", TIMEOUT_S])
-            .args(["--test-package", PACKAGE]);
-        let files: BTreeSet<_> = mutants.iter().map(Mutant::file).collect();
-        for file in files {
-            command.args(["--file", file]);
+/// What a mutant comes to.
+#[derive(Clone, Copy)]
+enum Fate {
+    Caught,
+    Late,
+    Unviable,
+    Survives,
+    /// The tests' program lacks something in this library.
+    NotRun,
+}
+
+/// A copy of the checkout, built.
+struct Copy {
+    tree: PathBuf,
+    tests: PathBuf,
+    libraries: String,
+}
+
+impl Copy {
+    fn build(tree: PathBuf) -> anyhow::Result<Self> {
+        let built = link(&tree)?;
+        if !built.status.success() {
+            eprintln!("{}", String::from_utf8_lossy(&built.stderr));
+            bail!("the core does not build as a shared library (see above)");
         }
-        for mutant in mutants {
-            command.args(["--re", &mutant.pattern()]);
+        let tests = String::from_utf8_lossy(&built.stdout)
+            .lines()
+            .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
+            .find_map(|message| Some(PathBuf::from(message.get("executable")?.as_str()?)))
+            .context("cargo named no test program")?;
+        let mut rustc = Command::new("rustc");
+        rustc.args(["--print", "target-libdir"]).current_dir(&tree);
+        let output = rustc.output().context("rustc could not be started")?;
+        let standard = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+        let own = tree.join("target/mutants/deps");
+        Ok(Self {
+            libraries: format!("{}:{standard}", own.display()),
+            tree,
+            tests,
+        })
+    }
+
+    /// Tries one mutant, and takes its change back.
+    fn attempt(&self, mutant: &Mutant) -> anyhow::Result<Fate> {
+        let path = self.tree.join(mutant.file());
+        let text = fs::read_to_string(&path)
+            .with_context(|| format!("{} cannot be read", path.display()))?;
+        let changed = mutant
+            .apply(&text)
+            .with_context(|| format!("{}: there is no such place", mutant.name()))?;
+        fs::write(&path, changed).map_err(|error| not_writable(&path, &error))?;
+        let mut fate = self.judge(mutant);
+        let alone = !matches!(fate, Ok(Fate::NotRun));
+        if !alone && link(&self.tree)?.status.success() {
+            fate = self.test(mutant);
         }
-        command
-            .args(["--", "--lib"])
-            .current_dir(tree)
-            .env_remove("CARGO_TARGET_DIR")
-            .env_remove("RUSTFLAGS")
+        fs::write(&path, text).map_err(|error| not_writable(&path, &error))?;
+        if !alone {
+            link(&self.tree)?;
+        }
+        fate
+    }
+
+    fn judge(&self, mutant: &Mutant) -> anyhow::Result<Fate> {
+        let mut build = cargo(&self.tree);
+        build
+            .args(["build", "--quiet", "--profile=mutants"])
+            .arg("--package=fitmac-core")
+            .stderr(Stdio::null());
+        let built = build.status().context("cargo could not be started")?;
+        if !built.success() {
+            return Ok(Fate::Unviable);
+        }
+        self.test(mutant)
+    }
+
+    fn test(&self, mutant: &Mutant) -> anyhow::Result<Fate> {
+        let first = FIRST.iter().map(|run| self.run(run));
+        let beside = self.module_with_tests(mutant);
+        let beside = beside.iter().map(|module| self.run_beside(module));
+        let last = LAST.iter().map(|run| self.run(run));
+        for status in first.chain(beside).chain(last) {
+            match status?.code() {
+                Some(0) => {}
+                Some(124) => return Ok(Fate::Late),
+                Some(126 | 127) => return Ok(Fate::NotRun),
+                _ => return Ok(Fate::Caught),
+            }
+        }
+        eprintln!("survives: {}", mutant.name());
+        Ok(Fate::Survives)
+    }
+
+    /// The module of a mutant, if it has tests of its own.
+    fn module_with_tests(&self, mutant: &Mutant) -> Option<String> {
+        let text = fs::read_to_string(self.tree.join(mutant.file())).ok()?;
+        let module = mutant.short_file().strip_suffix(".rs")?;
+        let module = module.strip_suffix("/mod").unwrap_or(module);
+        let has_tests = text.contains("#[cfg(test)]");
+        has_tests.then(|| format!("{}::tests::", module.replace('/', "::")))
+    }
+
+    /// Runs the tests of the program that these arguments name.
+    fn run(&self, arguments: &[&str]) -> anyhow::Result<ExitStatus> {
+        let mut program = Command::new(&self.tests);
+        program
+            .args(["--test-threads=1", "--quiet"])
+            .args(arguments)
+            .current_dir(self.tree.join("tests/core"));
+        self.wait(program)
+    }
+
+    /// Builds and runs the tests beside the code whose names begin with `module`.
+    fn run_beside(&self, module: &str) -> anyhow::Result<ExitStatus> {
+        let mut test = cargo(&self.tree);
+        test.args(["test", "--quiet", "--profile=mutants"]).args([
+            "--package=fitmac-core",
+            "--lib",
+            "--",
+            module,
+        ]);
+        self.wait(test)
+    }
+
+    fn wait(&self, command: Command) -> anyhow::Result<ExitStatus> {
+        let mut limited = limited(&command);
+        limited
+            .env("LD_LIBRARY_PATH", &self.libraries)
+            .env("RUST_BACKTRACE", "0")
             .stdin(Stdio::null())
-            .stdout(process::to_stderr());
-        command
-            .spawn()
-            .context("cargo-mutants could not be started")
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
+        limited.status().context("the tests could not be started")
     }
 }
 
-/// The names on one of cargo-mutants' lists.
-fn read(tree: &Path, list: &str) -> anyhow::Result<BTreeSet<String>> {
-    let path = tree.join(format!("mutants.out/{list}.txt"));
-    let text =
-        fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()))?;
-    Ok(text
-        .lines()
-        .map(|name| name.trim_end().to_owned())
-        .collect())
-}
-
-/// Copies what git knows or would add, so that a mutant never touches the checkout itself. What is
-/// the same stays untouched, and so need not be compiled again. `edit` may change a file's text.
-pub(super) fn copy(
-    from: &Path,
-    to: &Path,
-    edit: impl Fn(&str, Vec<u8>) -> Vec<u8>,
-) -> anyhow::Result<()> {
-    let mut git = Command::new("git");
-    git.args([
-        "ls-files",
-        "-z",
-        "--cached",
-        "--others",
-        "--exclude-standard",
-    ]);
-    let output = git
-        .current_dir(from)
-        .output()
-        .context("the checkout is copied by `git ls-files`: install git")?;
-    if !output.status.success() {
-        bail!("`git ls-files` fails: mutants are tried in a clone of the repository");
+/// The same command with limits on its memory and its time; 124 is the exit code of one that was
+/// late.
+fn limited(command: &Command) -> Command {
+    let mut limited = Command::new("sh");
+    limited
+        .args(["-c", "ulimit -c 0; ulimit -v \"$0\"; exec timeout \"$@\""])
+        .args([MEMORY_KIB, LATE_S])
+        .arg(command.get_program())
+        .args(command.get_args());
+    if let Some(folder) = command.get_current_dir() {
+        limited.current_dir(folder);
     }
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let files: BTreeSet<&str> = text.split('\0').filter(|f| !f.is_empty()).collect();
-    for file in &files {
-        // A file that git knows may be gone.
-        let Ok(text) = fs::read(from.join(file)) else {
-            continue;
+    for (key, value) in command.get_envs() {
+        match value {
+            Some(value) => limited.env(key, value),
+            None => limited.env_remove(key),
         };
-        let wanted = edit(file, text);
-        let target = to.join(file);
-        if fs::read(&target).is_ok_and(|found| found == wanted) {
-            continue;
-        }
-        fs::create_dir_all(target.parent().unwrap_or(to))
-            .and_then(|()| fs::write(&target, wanted))
-            .map_err(|error| not_writable(&target, &error))?;
     }
-    let sources = to.join("fitmac-core/src");
-    for file in super::sources(&sources, "fitmac-core/src/")? {
-        if !files.contains(file.as_str()) {
-            fs::remove_file(to.join(&file)).map_err(|error| not_writable(&sources, &error))?;
-        }
+    limited
+}
+
+/// Builds the core and the tests' program.
+fn link(tree: &Path) -> anyhow::Result<Output> {
+    let mut command = cargo(tree);
+    command
+        .args(["test", "--no-run", "--quiet", "--profile=mutants"])
+        .args(["--package=fitmac-core-tests", "--test=all"])
+        .arg("--message-format=json");
+    command.output().context("cargo could not be started")
+}
+
+/// Cargo in a copy. A mutant may break a lint's rule, but not the language's.
+fn cargo(tree: &Path) -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command
+        .current_dir(tree)
+        .env("RUSTFLAGS", "-Cprefer-dynamic --cap-lints=warn")
+        .env_remove("CARGO_ENCODED_RUSTFLAGS")
+        .env_remove("CARGO_TARGET_DIR")
+        .stdin(Stdio::null());
+    command
+}
+
+/// The core's manifest and root, as a shared library needs them: of which the tests beside the code
+/// need no more than the core itself.
+fn shared(file: &str, text: Vec<u8>) -> Vec<u8> {
+    let changes: &[(&str, &str)] = if file == "fitmac-core/Cargo.toml" {
+        &[
+            ("[lints]", "[lib]\ncrate-type = [\"dylib\"]\n\n[lints]"),
+            (
+                "[dev-dependencies]\nfitmac-core-tests.workspace = true\n",
+                "",
+            ),
+        ]
+    } else if file.strip_prefix(SOURCE) == Some("lib.rs") {
+        // A shared library must know who takes a panic.
+        &[(
+            "#![forbid(unsafe_code)]",
+            "#![forbid(unsafe_code)] extern crate std as _;",
+        )]
+    } else {
+        return text;
+    };
+    let mut text = String::from_utf8_lossy(&text).into_owned();
+    for (at, instead) in changes {
+        text = text.replacen(at, instead, 1);
     }
-    Ok(())
+    text.into_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_manifest_and_the_root_change() {
+        let manifest = "[lints]\nworkspace = true\n\n[dev-dependencies]\n\
+                        fitmac-core-tests.workspace = true\n";
+        let manifest = shared("fitmac-core/Cargo.toml", manifest.into());
+        let text = "[lib]\ncrate-type = [\"dylib\"]\n\n[lints]\nworkspace = true\n\n";
+        assert_eq!(String::from_utf8(manifest).as_deref(), Ok(text));
+        let root = shared(
+            "fitmac-core/src/lib.rs",
+            b"#![forbid(unsafe_code)]\n".into(),
+        );
+        assert_eq!(root, b"#![forbid(unsafe_code)] extern crate std as _;\n");
+        let other = shared("fitmac-core/src/gate.rs", b"[lints]".into());
+        assert_eq!(other, b"[lints]");
+    }
+
+    #[test]
+    fn a_limited_command_ends_as_the_command_does() {
+        let code = |script: &str| {
+            let mut command = Command::new("sh");
+            command.args(["-c", script]);
+            limited(&command).status().expect("it runs").code()
+        };
+        assert_eq!(code("exit 101"), Some(101));
+        assert_eq!(code("kill -9 $$"), None);
+    }
 }
