@@ -21,6 +21,10 @@ const REACH_X_M: [f64; 2] = [0.33, 0.70];
 const REACH_Y_M: [f64; 2] = [-0.32, 0.32];
 /// Least gap between a displaced object and its neighbours, m.
 const GAP_M: f64 = 0.02;
+/// Where a distance has no free place, it is varied in such steps, m, both ways.
+const DISTANCE_STEP_M: f64 = 0.01;
+/// So many of them at most.
+const DISTANCE_STEPS: u32 = 5;
 
 /// What is perturbed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -221,20 +225,41 @@ fn altered(suite: &Suite, task: &Task, seed: u64, variant: Variant) -> Result<Sc
     suite.sample_altered(task, seed, &alteration)
 }
 
-/// Moves an object by a distance in a drawn direction, to where it fits.
+/// Moves an object by a distance in a drawn direction, to where it fits. On a full table that is
+/// the nearest distance at which there is a place.
 fn displace(
     scene: &mut Scene,
     name: &str,
     distance_m: f64,
     rng: &mut ChaCha8Rng,
 ) -> Result<[f64; 2], SimError> {
-    let object = scene.by_name(name)?.clone();
+    let first: f64 = rng.random_range(0.0..core::f64::consts::TAU);
+    for step in 0..=DISTANCE_STEPS {
+        let off = f64::from(step) * DISTANCE_STEP_M;
+        for distance in [distance_m + off, distance_m - off] {
+            if let Some(to) = free_place(scene, name, distance, first)? {
+                scene.place_at(name, to)?;
+                return Ok(to);
+            }
+        }
+    }
+    let problem = format!("there is no free place {distance_m} m away, nor nearly so");
+    Err(SimError::invalid(format!("object `{name}`"), problem))
+}
+
+/// A place at this distance where an object fits, in directions on a golden-angle spiral from the
+/// first.
+fn free_place(
+    scene: &Scene,
+    name: &str,
+    distance_m: f64,
+    first: f64,
+) -> Result<Option<[f64; 2]>, SimError> {
+    let object = scene.by_name(name)?;
     let [x, y, _] = object.pose.position_m;
     let radius = |half: [f64; 3]| half[0].max(half[1]);
     let reach = radius(object.kind.half_extent_m());
-    let first: f64 = rng.random_range(0.0..core::f64::consts::TAU);
-    // Directions on a golden-angle spiral from a drawn one: the first that fits is taken.
-    for turn in 0..64 {
+    Ok((0..64).find_map(|turn| {
         let (sin, cos) = libm::sincos(first + 2.399_963 * f64::from(turn));
         let to = [x + distance_m * cos, y + distance_m * sin];
         let inside = (REACH_X_M[0]..=REACH_X_M[1]).contains(&to[0])
@@ -247,13 +272,8 @@ fn displace(
                 let gap = distance_xy_m(o.pose.position_m, [to[0], to[1], 0.0]);
                 gap > reach + radius(o.kind.half_extent_m()) + GAP_M
             });
-        if inside && free {
-            scene.place_at(name, to)?;
-            return Ok(to);
-        }
-    }
-    let problem = format!("there is no free place {distance_m} m away");
-    Err(SimError::invalid(format!("object `{name}`"), problem))
+        (inside && free).then_some(to)
+    }))
 }
 
 /// The arenas of the Env perturbation.

@@ -3,6 +3,7 @@
 use sim_harness::grounding::check_grounding;
 use sim_harness::perturb::{Level, Perturbation, instance};
 use sim_harness::pose::distance_xy_m;
+use sim_harness::scene::Scene;
 use sim_harness::suite::Suite;
 
 const SUITES: [&str; 2] = ["object", "spatial"];
@@ -84,6 +85,19 @@ fn a_displacement_has_its_length_and_touches_nothing() {
             );
         }
     }
+    // The table is full so far from where this one stands.
+    let crowded = suite.tasks.iter().find(|t| t.target == "cream_cheese");
+    let level = Level::DisplacedM(0.2);
+    let nearly = (0..200).filter(|seed| {
+        let crowded = crowded.unwrap();
+        let made = instance(&suite, crowded, Perturbation::Pos, level, *seed).unwrap();
+        let start = suite.sample_scene(crowded, *seed).unwrap();
+        let place = |scene: &Scene| scene.by_name(&crowded.target).unwrap().pose.position_m;
+        let moved_m = distance_xy_m(place(&start), place(&made.scene));
+        assert!((moved_m - 0.2).abs() < 0.05 + 1e-9, "{moved_m}");
+        (moved_m - 0.2).abs() > 1e-9
+    });
+    assert!(nearly.count() > 0);
     let task = &suite.tasks[0];
     let far = instance(&suite, task, Perturbation::Pos, Level::DisplacedM(3.0), 1);
     assert!(far.unwrap_err().to_string().contains("no free place"));

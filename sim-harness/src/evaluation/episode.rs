@@ -58,6 +58,12 @@ pub fn play(spec: &EpisodeSpec) -> Result<EpisodeRecord, SimError> {
     play_watched(spec, &mut Nobody)
 }
 
+/// What an episode starts from.
+pub(super) fn made(suite: &Suite, spec: &EpisodeSpec) -> Result<Instance, SimError> {
+    let task = &suite.tasks[suite.task_index(&spec.task)?];
+    instance(suite, task, spec.perturbation, spec.level, spec.draw_seed())
+}
+
 /// Plays an episode before an audience.
 ///
 /// # Errors
@@ -65,20 +71,12 @@ pub fn play(spec: &EpisodeSpec) -> Result<EpisodeRecord, SimError> {
 pub fn play_watched(spec: &EpisodeSpec, watch: &mut dyn Watch) -> Result<EpisodeRecord, SimError> {
     let suite = Suite::open(&spec.suite)?;
     let registry = Registry::embedded()?;
-    let index = suite.task_index(&spec.task)?;
-    let draw = spec.draw_seed();
-    let made = instance(
-        &suite,
-        &suite.tasks[index],
-        spec.perturbation,
-        spec.level,
-        draw,
-    )?;
+    let made = made(&suite, spec)?;
     let episode = Episode {
         spec,
         suite: &suite,
         registry: &registry,
-        draw,
+        draw: spec.draw_seed(),
         max_steps: u64::from(suite.max_steps) + SETTLE_STEPS,
     };
     let graspable = made
@@ -109,7 +107,7 @@ pub fn play_watched(spec: &EpisodeSpec, watch: &mut dyn Watch) -> Result<Episode
         schema: SCHEMA,
         core: build_of(&suite),
         suite: spec.suite.clone(),
-        task_index: u32::try_from(index).unwrap_or(u32::MAX),
+        task_index: u32::try_from(suite.task_index(&spec.task)?).unwrap_or(u32::MAX),
         task: spec.task.clone(),
         perturbation: spec.perturbation.name().to_owned(),
         level: spec.level.label(),

@@ -201,10 +201,12 @@ impl Preset {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::HashSet;
+    use std::collections::{HashMap, HashSet};
 
     use super::*;
     use crate::evaluation::EpisodeSpec;
+    use crate::evaluation::episode::made;
+    use crate::suite::Suite;
 
     #[test]
     fn presets_have_the_papers_numbers_of_episodes() {
@@ -233,6 +235,27 @@ mod tests {
         assert_eq!(apart(Preset::Sweeps), 2 * 10 * 5 * 5 * 9);
         let everything: HashSet<String> = Preset::ALL[..9].iter().flat_map(|p| keys(*p)).collect();
         assert!(everything.len() < 40_000, "{}", everything.len());
+    }
+
+    /// An evaluation of hours must not end at an episode that cannot be drawn.
+    #[test]
+    fn every_episode_of_every_preset_can_be_drawn() {
+        let mut known = HashSet::new();
+        let mut suites = HashMap::new();
+        for preset in Preset::ALL {
+            for spec in preset.grid().unwrap().episodes().unwrap() {
+                let cell = (spec.perturbation, spec.level.label(), spec.draw_seed());
+                if !known.insert(cell) {
+                    continue;
+                }
+                let suite = suites
+                    .entry(spec.suite.clone())
+                    .or_insert_with(|| Suite::open(&spec.suite).unwrap());
+                if let Err(error) = made(suite, &spec) {
+                    panic!("{}: {error}", spec.key());
+                }
+            }
+        }
     }
 
     #[test]

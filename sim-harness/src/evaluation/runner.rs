@@ -107,7 +107,10 @@ pub fn run(
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            let record = play(spec)?;
+            let record = play(spec).map_err(|cause| SimError::Within {
+                place: format!("episode {}", spec.key()),
+                cause: Box::new(cause),
+            })?;
             // A thread that panicked left nothing half done: a line is written in one go.
             let mut shared = shared
                 .lock()
