@@ -91,7 +91,7 @@ pub(crate) fn run(workspace: &Workspace, args: &Args) -> anyhow::Result<()> {
         let outcome = trial.run(&all)?;
         return complain(&open(root, &outcome.survivors, &explained)?);
     }
-    let left = left(root, &record, &mutants, &args.files)?;
+    let left = left(root, &record, &explained, &mutants, &args.files)?;
     let total: usize = left.iter().map(|(_, todo)| todo.len()).sum();
     step(&format!("{total} mutants in {} files", left.len()));
     for (n, (file, todo)) in left.iter().enumerate() {
@@ -102,7 +102,7 @@ pub(crate) fn run(workspace: &Workspace, args: &Args) -> anyhow::Result<()> {
             left.len()
         ));
         let outcome = trial.run(todo)?;
-        record.note(root, file, &outcome)?;
+        record.note(root, file, todo, &outcome)?;
     }
     judge(&record, root, &explained, Some(&mutants))
 }
@@ -112,6 +112,7 @@ pub(crate) fn run(workspace: &Workspace, args: &Args) -> anyhow::Result<()> {
 fn left<'a>(
     root: &Path,
     record: &Record,
+    explained: &[Exception],
     mutants: &'a [Mutant],
     only: &[String],
 ) -> anyhow::Result<Vec<(String, Vec<&'a Mutant>)>> {
@@ -133,7 +134,11 @@ fn left<'a>(
             continue;
         }
         if let Some(entry) = record.fresh(root, short)? {
-            todo.retain(|mutant| entry.survivors.contains(&mutant.site(root).key()));
+            todo.retain(|mutant| {
+                let site = mutant.site(root);
+                let has_reason = explained.iter().any(|e| site.is_explained_by(e));
+                !has_reason && entry.survivors.contains(&site.key())
+            });
         }
         if !todo.is_empty() {
             left.push((short.to_owned(), todo));
@@ -228,7 +233,7 @@ fn judge(
         share * 100.0,
         sum.unviable
     );
-    let whole = untried(root, record, mutants)?;
+    let whole = untried(root, record, explained, mutants)?;
     if !open.is_empty() {
         open.iter().for_each(|draft| println!("{draft}"));
         bail!(
@@ -247,10 +252,18 @@ fn judge(
 }
 
 /// Says which files are not on record as they are now; true if it is known that there is none.
-fn untried(root: &Path, record: &Record, mutants: Option<&[Mutant]>) -> anyhow::Result<bool> {
+fn untried(
+    root: &Path,
+    record: &Record,
+    explained: &[Exception],
+    mutants: Option<&[Mutant]>,
+) -> anyhow::Result<bool> {
     let mut missing = Vec::new();
     match mutants {
-        Some(mutants) => missing.extend(left(root, record, mutants, &[])?.into_iter().map(|l| l.0)),
+        Some(mutants) => {
+            let left = left(root, record, explained, mutants, &[])?;
+            missing.extend(left.into_iter().map(|(file, _)| file));
+        }
         None => {
             for short in sources(&root.join("fitmac-core/src"), "")? {
                 if record.fresh(root, &short)?.is_none() {

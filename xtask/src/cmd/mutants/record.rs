@@ -6,7 +6,7 @@ use anyhow::Context;
 use sha2::{Digest, Sha256};
 
 use super::{
-    names::{Key, SOURCE},
+    names::{Key, Mutant, SOURCE},
     trial::Outcome,
 };
 use crate::workspace::not_writable;
@@ -117,11 +117,20 @@ impl Record {
         Ok((entry.source == hash(root, file)?).then_some(entry))
     }
 
-    /// Notes what came out of a file, and writes it down. Where only the survivors of an earlier
-    /// run were tried, the others stay as they were.
-    pub(super) fn note(&mut self, root: &Path, file: &str, out: &Outcome) -> anyhow::Result<()> {
+    /// Notes what came out of the mutants of a file that were tried, and writes it down. Where
+    /// only survivors of an earlier run were tried, the others stay as they were.
+    pub(super) fn note(
+        &mut self,
+        root: &Path,
+        file: &str,
+        tried: &[&Mutant],
+        out: &Outcome,
+    ) -> anyhow::Result<()> {
         let before = self.fresh(root, file)?.cloned().unwrap_or_default();
-        let mut survivors: Vec<_> = out.survivors.iter().map(|m| m.site(root).key()).collect();
+        let tried: Vec<_> = tried.iter().map(|m| m.site(root).key()).collect();
+        let still = out.survivors.iter().map(|m| m.site(root).key());
+        let others = before.survivors.iter().filter(|key| !tried.contains(key));
+        let mut survivors: Vec<_> = still.chain(others.cloned()).collect();
         survivors.sort();
         let entry = Entry {
             source: hash(root, file)?,
