@@ -23,7 +23,7 @@ pub(crate) fn hand(ee_m: Vector3, state: GripperState) -> Signals {
 }
 
 /// A small target at `position_m`, under the hand and far from it.
-pub(crate) fn target(position_m: Vector3) -> TargetView {
+pub(crate) const fn target(position_m: Vector3) -> TargetView {
     TargetView {
         id: 1,
         position_m,
@@ -39,7 +39,7 @@ pub(crate) fn target(position_m: Vector3) -> TargetView {
 }
 
 /// A surface at `position_m`, half a metre each way, and the target above its middle.
-pub(crate) fn surface(position_m: Vector3) -> DestinationView {
+pub(crate) const fn surface(position_m: Vector3) -> DestinationView {
     DestinationView {
         position_m,
         half_extent_m: [0.5, 0.5, 0.0],

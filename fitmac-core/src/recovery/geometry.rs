@@ -224,3 +224,6 @@ fn yaw_to_narrow_side(params: &Params, orientation: UnitQuaternion, target: &Tar
         (None, None) => 0.0,
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -316,3 +316,6 @@ impl Step {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

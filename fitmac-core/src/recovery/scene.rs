@@ -79,3 +79,6 @@ impl<'a> Scene<'a> {
         self.params.switches.hard_place && self.destination_object != 0
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -64,3 +64,6 @@ impl Stuck {
         Some([x * share, y * share, z + up])
     }
 }
+
+#[cfg(test)]
+mod tests;
