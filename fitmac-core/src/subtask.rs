@@ -428,3 +428,6 @@ impl Subtask {
             .map_or(0, |o| o.id)
     }
 }
+
+#[cfg(test)]
+mod tests;

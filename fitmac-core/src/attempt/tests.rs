@@ -396,3 +396,10 @@ fn a_region_ends_at_its_edges_its_surface_and_its_rim() {
     }
     assert_eq!(in_region(&hand([0.0; 3], GripperState::Open)), None);
 }
+
+impl Attempt {
+    /// The same with this evidence waiting for a query.
+    pub(crate) fn with(self, latched: u64) -> Self {
+        Self { latched, ..self }
+    }
+}

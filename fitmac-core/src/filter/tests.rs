@@ -138,3 +138,29 @@ fn what_asks_too_much_gets_the_jerk_then_the_acceleration_then_the_velocity() {
     let back = next(&limits(), from(1.5, 0.0, 0.0), 5.0);
     assert_eq!(back, [1.0, -1.0, -2.0]);
 }
+
+#[test]
+fn what_just_reaches_the_edge_or_stands_still_outside_is_left_bit_for_bit() {
+    let mut edge = limits();
+    (edge.workspace_min_x_m, edge.workspace_max_x_m) = (-0.9, 0.9);
+    let scale = ActionScale {
+        translation_m: 0.05,
+        ..ActionScale::default()
+    };
+    let passes = |ee_x: f64, x: f64| {
+        let wanted = [x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+        let out = limit_action(&scale, &edge, [ee_x, 0.0, 0.0], 1.0, &wanted);
+        assert_eq!(out.value[0].to_bits(), x.to_bits(), "{ee_x} {x}");
+        assert!(!out.limited);
+    };
+    // The room that is left, divided by the scale, would be rounded to another number.
+    let x = 0.025;
+    let ee_x = 0.9 - x * 0.05;
+    assert!(ee_x + x * 0.05 == 0.9 && (0.9 - ee_x) / 0.05 != x);
+    passes(ee_x, x);
+    passes(-ee_x, -x);
+    for outside in [1.5, -1.5] {
+        passes(outside, 0.0);
+        passes(outside, -0.0);
+    }
+}

@@ -142,6 +142,23 @@ fn only_a_sound_direct_destination_is_an_anchor() {
     ] {
         assert_eq!(anchor(&spoilt), None);
     }
+    // A relation is remembered as one: the policy places, and nothing is missing.
+    let kind = |kind: DestinationKind| {
+        let mut lock = Lock::open(0);
+        lock.commit(&GroundingRecord {
+            destination_kind: kind.code(),
+            ..record(1, 1.0)
+        });
+        lock.binding().map(|b| b.destination)
+    };
+    assert_eq!(
+        kind(DestinationKind::Relational),
+        Some(Destination::Relational)
+    );
+    assert_eq!(
+        kind(DestinationKind::Unresolved),
+        Some(Destination::Unresolved)
+    );
 }
 
 #[test]

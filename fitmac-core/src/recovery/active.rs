@@ -226,3 +226,6 @@ fn act(scene: &Scene<'_>, motion: &Motion) -> Step {
         None => Step::Bottom(reason::NO_ACTION),
     }
 }
+
+#[cfg(test)]
+mod tests;

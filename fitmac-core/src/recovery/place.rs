@@ -272,3 +272,6 @@ fn aligned(scene: &Scene<'_>, target: &TargetView, d: &DestinationView) -> Vecto
     let [dx, dy, _] = vector::sub(d.position_m, target.position_m);
     vector::add(scene.signals.ee_m, [dx, dy, 0.0])
 }
+
+#[cfg(test)]
+mod tests;
