@@ -81,3 +81,6 @@ impl Oscillation {
         before.is_some_and(|b| vector::dot(b, stride_m) < 0.0)
     }
 }
+
+#[cfg(test)]
+mod tests;

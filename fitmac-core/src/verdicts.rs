@@ -94,3 +94,6 @@ fn clamped(confidence: f64) -> f64 {
         confidence.clamp(0.0, 1.0)
     }
 }
+
+#[cfg(test)]
+mod tests;
