@@ -17,7 +17,7 @@ use crate::tables::{Source, by_displacement, delays};
 /// All plots that the results can fill.
 pub(crate) fn all(source: Source<'_>) -> Vec<Plot> {
     let mut plots = Vec::new();
-    for setting in source.episodes.settings() {
+    for setting in source.episodes.own_settings() {
         for backbone in source.episodes.backbones() {
             plots.extend(success(source, backbone, &setting));
         }

@@ -69,7 +69,9 @@ pub struct Setting {
 }
 
 impl Setting {
-    fn of(record: &EpisodeRecord) -> Self {
+    /// Of an episode.
+    #[must_use]
+    pub fn of(record: &EpisodeRecord) -> Self {
         Self {
             profile: record.profile.clone(),
             perception: record.perception.clone(),
@@ -203,12 +205,26 @@ impl<'a> Episodes<'a> {
         }
     }
 
-    /// Whether some episode has a surrogate and configuration.
+    /// The settings that have tables of their own. One that differs from another with more episodes
+    /// only in who grounds is there for the comparison of the two.
     #[must_use]
-    pub fn has(&self, backbone: &str, config: &str) -> bool {
-        self.records
-            .iter()
-            .any(|r| r.backbone == backbone && r.config == config)
+    pub fn own_settings(&self) -> Vec<Setting> {
+        let settings = self.settings();
+        let count = |setting: &Setting| {
+            let controlled = self.records.iter().filter(|r| r.config != BASE);
+            controlled.filter(|r| Setting::of(r) == *setting).count()
+        };
+        let beside = |a: &Setting, b: &Setting| {
+            (&a.profile, &a.perception) == (&b.profile, &b.perception) && count(b) > count(a)
+        };
+        let contrast = |a: &Setting| settings.iter().any(|b| beside(a, b));
+        settings.iter().filter(|s| !contrast(s)).cloned().collect()
+    }
+
+    /// Whether some episode has a surrogate and configuration under a setting, at the standard level.
+    #[must_use]
+    pub fn has(&self, backbone: &str, config: &str, setting: &Setting) -> bool {
+        !self.of_config(backbone, config, setting).is_empty()
     }
 
     /// The episodes of a configuration under a setting, at the standard level.

@@ -131,6 +131,24 @@ fn own_grounding_stands_beside_what_the_simulator_knows() {
 }
 
 #[test]
+fn a_contrast_has_its_table_and_no_others() {
+    let mut lines = cell();
+    lines.push(line(
+        json!({"episode": 3, "config": "full", "knowledge": "simulator"}),
+    ));
+    lines.push(line(
+        json!({"episode": 3, "config": "wo-target", "knowledge": "simulator"}),
+    ));
+    let report = report(&lines);
+    let ids: Vec<&str> = report.tables.iter().map(|t| t.id.as_str()).collect();
+    assert!(ids.contains(&"knowledge"), "{ids:?}");
+    assert!(ids.iter().any(|id| id.ends_with("-agents")), "{ids:?}");
+    assert!(!ids.iter().any(|id| id.ends_with("-simulator")), "{ids:?}");
+    // Nor has a part that was switched off elsewhere only.
+    assert!(!ids.iter().any(|id| id.starts_with("ablation")), "{ids:?}");
+}
+
+#[test]
 fn pairs_are_what_the_hand_counts() {
     let report = report(&cell());
     let pairs = &report.verdicts[0].pairs;

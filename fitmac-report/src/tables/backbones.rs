@@ -19,7 +19,7 @@ pub fn backbones(source: Source<'_>, setting: &Setting) -> Vec<Table> {
         let mut rows = Vec::new();
         for backbone in &names {
             for (config, what) in [(BASE, "alone"), (FULL, "with FIT-MAC")] {
-                if episodes.has(backbone, config) {
+                if episodes.has(backbone, config, setting) {
                     let line = Line {
                         experiment: Experiment::Backbones,
                         suite,
@@ -56,7 +56,8 @@ pub fn backbones(source: Source<'_>, setting: &Setting) -> Vec<Table> {
 }
 
 fn averages(source: Source<'_>, names: &[&str], setting: &Setting) -> Option<Table> {
-    let both = |name: &&&str| source.episodes.has(name, BASE) && source.episodes.has(name, FULL);
+    let has = |name: &str, config| source.episodes.has(name, config, setting);
+    let both = |name: &&&str| has(name, BASE) && has(name, FULL);
     let names: Vec<&str> = names.iter().filter(both).copied().collect();
     if names.is_empty() {
         return None;

@@ -8,7 +8,8 @@ use crate::table::{Cell, Column, Row, Table, Topic};
 /// Success beside the published methods (Table 1), and how it comes about (Table 2).
 #[must_use]
 pub fn main_table(source: Source<'_>, setting: &Setting) -> Vec<Table> {
-    if !source.episodes.has(MAIN, BASE) && !source.episodes.has(MAIN, FULL) {
+    let has = |config| source.episodes.has(MAIN, config, setting);
+    if !has(BASE) && !has(FULL) {
         return Vec::new();
     }
     let players = [(MAIN, BASE), (MAIN, FULL)];

@@ -40,7 +40,7 @@ pub struct Source<'a> {
 #[must_use]
 pub fn all(source: Source<'_>) -> Vec<Table> {
     let mut tables = Vec::new();
-    for setting in source.episodes.settings() {
+    for setting in source.episodes.own_settings() {
         tables.extend(main_table(source, &setting));
         tables.extend(backbones(source, &setting));
         tables.extend(ablation(source, &setting));

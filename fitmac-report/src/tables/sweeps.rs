@@ -24,7 +24,7 @@ pub fn sweeps(source: Source<'_>, setting: &Setting) -> Vec<Table> {
             let config = |value: &str| format!("full+{parameter}={value}");
             if !values
                 .iter()
-                .any(|v| source.episodes.has(backbone, &config(v)))
+                .any(|v| source.episodes.has(backbone, &config(v), setting))
             {
                 continue;
             }
@@ -60,7 +60,11 @@ impl Sweep<'_> {
     /// The configuration that has a value: the default one is not run twice.
     fn config(&self, value: &str) -> String {
         let named = format!("full+{}={value}", self.parameter);
-        if value == self.default && !self.source.episodes.has(self.backbone, &named) {
+        let played = self
+            .source
+            .episodes
+            .has(self.backbone, &named, self.setting);
+        if value == self.default && !played {
             FULL.to_owned()
         } else {
             named
@@ -178,7 +182,8 @@ fn beside(ours: Cell, theirs: Cell) -> Cell {
 }
 
 /// Success over the distance by which something is displaced, in mm, per configuration: what the
-/// table and the plot of the displacement show. Empty unless there are at least two distances.
+/// table and the plot of the displacement show. Empty unless something was displaced under this
+/// setting.
 #[must_use]
 pub fn by_displacement(
     source: Source<'_>,
@@ -189,8 +194,7 @@ pub fn by_displacement(
         let Some(distance) = distance_mm(record) else {
             continue;
         };
-        let same = (&record.profile, &record.perception, &record.knowledge)
-            == (&setting.profile, &setting.perception, &setting.knowledge);
+        let same = Setting::of(record) == *setting;
         if record.config == BASE || (record.config == FULL && same) {
             let who = (record.backbone.clone(), record.config.clone());
             cells
@@ -211,6 +215,11 @@ pub fn by_displacement(
         if measured.keys().any(|d| *d > 0) {
             rates.insert(who, measured);
         }
+    }
+    let played = source.episodes.all().iter();
+    let here = played.filter(|r| Setting::of(r) == *setting && distance_mm(r) > Some(0));
+    if here.count() == 0 {
+        rates.clear();
     }
     rates
 }
