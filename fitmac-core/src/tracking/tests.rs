@@ -123,3 +123,40 @@ fn what_is_gone_is_known_nowhere() {
         (None, None)
     );
 }
+
+#[test]
+fn another_object_is_not_averaged_with_the_last_one() {
+    let params = params();
+    let mut tracking = Tracking::new();
+    let first = sample(1, AWAY, 1, [0.25, 0.0, 0.0]);
+    tracking.step(&params, &first, TARGET, ANCHOR, false);
+    let second = sample(2, AWAY, 2, [0.25, 0.0, 0.0]);
+    tracking.step(&params, &second, ANCHOR, TARGET, false);
+    assert_eq!(tracking.anchor_m(), Some([0.25, 0.0, 0.0]));
+    assert_eq!(tracking.target_m(&second), Some([0.0, 0.0, 0.25]));
+    // Nor if it was seen at the same moment.
+    let mut again = Tracking::new();
+    again.step(&params, &first, TARGET, ANCHOR, false);
+    again.step(&params, &first, ANCHOR, TARGET, false);
+    assert_eq!(again.anchor_m(), Some([0.25, 0.0, 0.0]));
+    assert_eq!(again.target_m(&first), Some([0.0, 0.0, 0.25]));
+}
+
+#[test]
+fn what_the_hand_holds_unseen_stays_where_it_was_seen_last() {
+    let params = params();
+    let mut tracking = Tracking::new();
+    let near = sample(1, [0.0; 3], 1, [0.25, 0.0, 0.0]);
+    tracking.step(&params, &near, TARGET, ANCHOR, true);
+    let mut unseen = sample(2, [0.0; 3], 2, [4.0, 0.0, 0.0]);
+    unseen.objects[0].visible = 0;
+    tracking.step(&params, &unseen, TARGET, ANCHOR, true);
+    assert_eq!(tracking.target_m(&unseen), Some([0.25, 0.0, 0.0]));
+    // Nor is one look taken for two.
+    let mut repeated = sample(3, [0.0; 3], 2, [0.375, 0.0, 0.0]);
+    tracking.step(&params, &repeated, TARGET, ANCHOR, true);
+    assert_eq!(tracking.target_m(&repeated), Some([0.25, 0.0, 0.0]));
+    repeated.objects[0].stamp_ns = 3;
+    tracking.step(&params, &repeated, TARGET, ANCHOR, true);
+    assert_eq!(tracking.target_m(&repeated), Some([0.28125, 0.0, 0.0]));
+}

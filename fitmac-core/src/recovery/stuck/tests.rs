@@ -80,3 +80,13 @@ fn a_hand_near_the_base_is_drawn_to_its_axis_and_no_farther() {
     let on_it = ways(true, true, [0.0, 0.0, 0.25]);
     assert_eq!(on_it[1], Some([0.0, 0.0, 0.25 + BACK_OUT_M[1]]));
 }
+
+#[test]
+fn an_arm_that_moves_by_the_limit_does_not_stand() {
+    let mut stuck = Stuck::NEVER;
+    stuck.note([0.0; 3], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    stuck.look([STANDING_M, 0.0, 0.0]);
+    assert_eq!(stuck.queries, 0);
+    stuck.look([0.5 * STANDING_M, 0.0, 0.0]);
+    assert_eq!(stuck.queries, 1);
+}
