@@ -30,6 +30,7 @@ fn a_turn_is_a_stride_against_the_last_one() {
     assert_eq!(swings(&wide, [0.0, 0.5, 0.0]), 0b100);
     assert_eq!(swings(&wide, [0.0, 0.5, 0.25, 0.0]), 0b1100, "one turn");
     assert_eq!(swings(&wide, [0.0, 0.25, 0.5, 1.0]), 0);
+    assert_eq!(swings(&wide, [0.0, STRIDE_M, 0.0]), 0b100, "just a stride");
     // What is shorter than a stride has no direction; it adds up from where the last one ended.
     let short = 0.99 * STRIDE_M;
     assert_eq!(swings(&wide, [0.0, 0.5, 0.5 - short, 0.5, 1.0]), 0);
