@@ -85,6 +85,8 @@ enum Command {
     Faults(cmd::faults::Args),
     /// Play every experiment of the paper and make the report (hours; it goes on where it ended).
     Evaluate(cmd::evaluate::Args),
+    /// Train the surrogate that learns from demonstrations (`--out FOLDER`: six minutes).
+    TrainBc(cmd::train_bc::Args),
     /// Run one controller with demo after demo around it: nothing may grow (half an hour).
     SoakRt(cmd::soak_rt::Args),
     /// Count allocations and system calls of the control thread (a million ticks: 9 minutes).
@@ -112,6 +114,7 @@ fn main() -> ExitCode {
         Command::Swarm(args) => cmd::swarm::run(&workspace, &args),
         Command::Fuzz(args) => cmd::fuzz::run(&workspace, &args),
         Command::Evaluate(args) => cmd::evaluate::run(&workspace, &args),
+        Command::TrainBc(args) => cmd::train_bc::run(&workspace, &args),
         Command::Mutants(args) => cmd::mutants::run(&workspace, &args),
         Command::Coverage(args) => cmd::coverage::run(&workspace, &args),
         Command::Soak(args) => cmd::soak::run(&workspace, &args),

@@ -36,7 +36,7 @@ makes tables and plots of them.
 Seeds 1000 to 9999 are for choosing parameters; reports use 7, 11, 13, 17, 23.")]
 pub(crate) struct Args {
     /// Named experiments, played in this order: main, harm, backbones, ablation, seeds, sweeps,
-    /// contrast, displacement, ablation-pi05, smoke. The options below change all of them.
+    /// contrast, displacement, ablation-pi05, learned, smoke. The options below change all of them.
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     preset: Vec<String>,
     /// Suites: object, spatial, or a file like sim-harness/assets/suites/object.toml.
@@ -54,7 +54,7 @@ pub(crate) struct Args {
     /// Scales the target by these factors instead of obj's own variant.
     #[arg(long, value_delimiter = ',', value_name = "FACTORS")]
     scale: Vec<f64>,
-    /// Surrogates: openvla-like, pi0-like, pi05-like, and controls.
+    /// Surrogates: openvla-like, pi0-like, pi05-like, bc (learned), and controls.
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     backbone: Vec<String>,
     /// Configurations of the controller.

@@ -58,8 +58,8 @@ pub(crate) struct Args {
     /// The suite that the policy was trained on.
     #[arg(long, default_value = "object")]
     suite: String,
-    /// Which surrogate: openvla-like, pi0-like, pi05-like, blind-replay, chaos, and controls
-    /// (oracle, hold, random).
+    /// Which surrogate: openvla-like, pi0-like, pi05-like, bc (learned), blind-replay, chaos, and
+    /// controls (oracle, hold, random).
     #[arg(long, default_value = "openvla-like")]
     backbone: String,
     /// Draws the policy's noise.

@@ -4,6 +4,7 @@
 //! and answers with a chunk of actions. It is never told which perturbation made the scene. Every
 //! table that comes of one says "surrogate".
 
+pub mod bc;
 mod chaos;
 mod control;
 mod memory;

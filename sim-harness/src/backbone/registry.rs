@@ -3,6 +3,7 @@
 use serde::Deserialize;
 use sha2::{Digest as _, Sha256};
 
+use super::bc::{self, Cloned};
 use super::chaos::Chaos;
 use super::control::{Hold, Random};
 use super::replay::ReplayParams;
@@ -38,6 +39,12 @@ pub enum Spec {
         /// Share of the answers that are.
         rate: f64,
     },
+    /// Plays what a network learnt from demonstrations; its weights are its parameters.
+    #[serde(skip)]
+    Cloned {
+        /// Name in tables.
+        name: String,
+    },
     /// Moves at random.
     Random {
         /// Name in tables.
@@ -55,7 +62,10 @@ impl Spec {
     pub fn name(&self) -> &str {
         match self {
             Self::Replay(params) => &params.name,
-            Self::Hold { name, .. } | Self::Random { name, .. } | Self::Chaos { name, .. } => name,
+            Self::Hold { name, .. }
+            | Self::Random { name, .. }
+            | Self::Chaos { name, .. }
+            | Self::Cloned { name } => name,
         }
     }
 
@@ -66,7 +76,7 @@ impl Spec {
             Self::Hold { horizon: 0, .. } | Self::Random { horizon: 0, .. } => {
                 Some("horizon is 0; it must be positive".to_owned())
             }
-            Self::Hold { .. } | Self::Random { .. } => None,
+            Self::Hold { .. } | Self::Random { .. } | Self::Cloned { .. } => None,
             Self::Chaos { rate, .. } if !(0.0..=1.0).contains(rate) => {
                 Some(format!("rate is {rate}; a share lies in 0 to 1"))
             }
@@ -88,12 +98,16 @@ pub struct Registry {
 }
 
 impl Registry {
-    /// The embedded, frozen parameter sets.
+    /// The embedded, frozen parameter sets, and the policy that was learnt from demonstrations.
     ///
     /// # Errors
     /// Only if the embedded file is broken, which a test rules out.
     pub fn embedded() -> Result<Self, SimError> {
-        Self::parse("backbones.toml", BACKBONES)
+        let mut registry = Self::parse("backbones.toml", BACKBONES)?;
+        registry.specs.push(Spec::Cloned {
+            name: bc::NAME.to_owned(),
+        });
+        Ok(registry)
     }
 
     /// Reads parameter sets. `file` is the name that errors give.
@@ -144,6 +158,7 @@ impl Registry {
             Spec::Replay(params) => Ok(params.open_loop),
             Spec::Hold { open_loop, .. } | Spec::Random { open_loop, .. } => Ok(*open_loop),
             Spec::Chaos { of, .. } => self.open_loop(of),
+            Spec::Cloned { .. } => Ok(bc::CHUNK_STEPS as u32),
         }
     }
 
@@ -154,6 +169,7 @@ impl Registry {
     pub fn build(&self, name: &str, suite: &Suite) -> Result<Box<dyn Backbone>, SimError> {
         Ok(match self.get(name)? {
             Spec::Replay(params) => Box::new(Replay::new(params.clone(), Memory::of(suite)?)),
+            Spec::Cloned { .. } => Box::new(Cloned::trained_on(&suite.name)?),
             Spec::Hold { horizon, .. } => Box::new(Hold::new(*horizon)),
             Spec::Random { horizon, .. } => Box::new(Random::new(*horizon)),
             Spec::Chaos { of, rate, .. } => {
@@ -167,14 +183,17 @@ impl Registry {
         self.specs.iter().map(Spec::name)
     }
 
-    /// The first twelve hexadecimal digits of the SHA-256 of what defines a surrogate: they stand
-    /// in every result.
+    /// The first twelve hexadecimal digits of the SHA-256 of what defines a surrogate, its
+    /// parameters or weights: they stand in every result.
     ///
     /// # Errors
     /// As for [`Registry::get`].
     pub fn fingerprint(&self, name: &str) -> Result<String, SimError> {
-        self.get(name)?;
-        Ok(self.sha256.chars().take(12).collect())
+        let digits = match self.get(name)? {
+            Spec::Cloned { .. } => bc::weights_sha256(),
+            _ => self.sha256.clone(),
+        };
+        Ok(digits.chars().take(12).collect())
     }
 
     /// SHA-256 of the parameter file, in hexadecimal.

@@ -2,6 +2,7 @@
 
 use super::config::{Config, Knowledge, Profile, Vision};
 use super::grid::Grid;
+use crate::backbone::bc;
 use crate::error::SimError;
 use crate::perturb::{Level, Perturbation};
 
@@ -32,6 +33,8 @@ pub enum Preset {
     Contrast,
     /// Ours: how far a target can be displaced before the policy alone loses it.
     Displacement,
+    /// Ours: the surrogate that learned from demonstrations, in nominal and perturbed scenes.
+    Learned,
     /// A few episodes of everything, to see that it works.
     Smoke,
 }
@@ -59,7 +62,7 @@ const SWEEPS: [(&str, &[&str]); 4] = [
 
 impl Preset {
     /// All of them, what matters most first.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Main,
         Self::Harm,
         Self::Backbones,
@@ -69,6 +72,7 @@ impl Preset {
         Self::Contrast,
         Self::Displacement,
         Self::AblationPi05,
+        Self::Learned,
         Self::Smoke,
     ];
 
@@ -85,6 +89,7 @@ impl Preset {
             Self::Harm => "harm",
             Self::Contrast => "contrast",
             Self::Displacement => "displacement",
+            Self::Learned => "learned",
             Self::Smoke => "smoke",
         }
     }
@@ -189,6 +194,11 @@ impl Preset {
                     ..usual
                 }
             }
+            Self::Learned => Grid {
+                perturbations: [nominal, five()].concat(),
+                backbones: owned(&[bc::NAME]),
+                ..usual
+            },
             Self::Smoke => Grid {
                 perturbations: [nominal, five()].concat(),
                 seeds: vec![*TUNING_SEEDS.start()],
@@ -219,6 +229,8 @@ mod tests {
         // Half of them.
         assert_eq!(count(Preset::AblationPi05), 2 * 10 * 5 * 5 * 6);
         assert_eq!(count(Preset::Sweeps), 2 * 10 * 5 * 5 * 10);
+        // The policy alone and with the controller.
+        assert_eq!(count(Preset::Learned), 2 * 10 * 6 * 10 * 2);
     }
 
     #[test]

@@ -21,3 +21,4 @@ pub(crate) mod soak_rt;
 pub(crate) mod stack;
 pub(crate) mod swarm;
 pub(crate) mod test;
+pub(crate) mod train_bc;
