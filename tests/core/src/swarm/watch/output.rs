@@ -117,8 +117,12 @@ pub(super) fn limits(
         let dv = change(|c| c.setpoint_velocity_m_s);
         let da = change(|c| c.setpoint_acceleration_m_s2);
         let speed = command.setpoint_velocity_m_s[axis].abs();
+        // Accelerations are differences of speeds: between ticks a nanosecond apart, their rounding
+        // counts.
+        let before = last.setpoint_velocity_m_s[axis].abs();
+        let rounding = f64::EPSILON * (speed + before) / dt_s.max(1e-9);
         // The speed limit may cut an acceleration off at once.
-        let jerk_ok = da <= most(f.jerk_m_s3) || speed > 0.999 * f.velocity_m_s;
+        let jerk_ok = da <= most(f.jerk_m_s3) + rounding || speed > 0.999 * f.velocity_m_s;
         let within = speed <= f.velocity_m_s + ROUNDING
             && command.setpoint_acceleration_m_s2[axis].abs() <= f.acceleration_m_s2 + ROUNDING
             && dp <= most(f.velocity_m_s)
