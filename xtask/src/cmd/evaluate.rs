@@ -8,7 +8,7 @@ use crate::{mujoco, process, workspace::Workspace};
 
 /// Every experiment, what matters most first. They share episodes, which are played once.
 const PRESETS: &str =
-    "main,harm,backbones,ablation,seeds,sweeps,contrast,displacement,ablation-pi05";
+    "main,harm,backbones,ablation,seeds,sweeps,contrast,displacement,ablation-pi05,learned";
 /// Episodes a task of the first round: all cells of the main table are there early.
 const FIRST_ROUND: &str = "10";
 
