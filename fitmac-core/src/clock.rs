@@ -86,4 +86,15 @@ mod tests {
         clock.start_step(1130 * MS, 50);
         assert!(!clock.is_due(1179 * MS) && clock.is_due(1180 * MS));
     }
+
+    #[test]
+    fn a_gap_of_a_suspended_process_is_longer_than_the_bound() {
+        let mut clock = StepClock::new();
+        assert!(!clock.advance(1000 * MS, 500).suspended, "the first");
+        assert!(!clock.advance(1500 * MS, 500).suspended, "the bound itself");
+        let late = clock.advance(2000 * MS + 1, 500);
+        assert!(late.suspended && (late.dt_s - 0.500_000_001).abs() < 1e-12);
+        let back = clock.advance(2000 * MS, 500);
+        assert!(back.backwards && !back.suspended && back.dt_s == 0.0);
+    }
 }

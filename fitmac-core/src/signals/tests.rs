@@ -162,3 +162,32 @@ fn a_bowl_that_hangs_askew_reaches_down_with_its_foot_which_is_narrower_than_its
     };
     assert!(about(half_height(&aside), 0.25) && about(depth(&aside), 0.15));
 }
+
+#[test]
+fn of_two_things_equally_near_the_first_in_the_list_is_the_nearest_other() {
+    let can = |id, x_m| ObjectSample {
+        id,
+        grasp_class: GraspClass::Can.code(),
+        ..bowl([x_m, 0.0, 0.0])
+    };
+    let nearest = |objects: &[ObjectSample]| {
+        let mut sample = StateSample {
+            object_count: objects.len() as u32,
+            ..StateSample::default()
+        };
+        for (slot, object) in sample.objects.iter_mut().zip(objects) {
+            *slot = *object;
+        }
+        nearest_other(&Grasp::default(), &sample, 8, 9).map(|other| other.id)
+    };
+    assert_eq!(nearest(&[can(5, 0.5), can(3, -0.5)]), Some(5));
+    assert_eq!(nearest(&[can(3, -0.5), can(5, 0.5)]), Some(3));
+    assert_eq!(nearest(&[can(3, -0.5), can(5, 0.25)]), Some(5));
+    // The target, its anchor, a nameless thing and a fixture are no other.
+    let fixture = ObjectSample {
+        grasp_class: GraspClass::Fixture.code(),
+        ..can(2, 0.0)
+    };
+    let none = [can(8, 0.0), can(9, 0.0), can(0, 0.0), fixture];
+    assert_eq!(nearest(&none), None);
+}

@@ -1,5 +1,7 @@
 //! Single functions at the edges of what they take, where no session leads.
 
+mod intake;
+
 use fitmac_core::{
     Controller, Params,
     filter::{Commanded, limit_action},
