@@ -126,6 +126,9 @@ fn the_way_to_a_rim_is_the_way_to_its_nearest_point() {
     assert_eq!(offset([1.5, 1.0, 1.5]), [0.25, 0.0, 0.5]);
     assert_eq!(offset([1.0, 1.125, 1.0]), [0.0, -0.125, 0.0]);
     assert_eq!(offset([1.0, 1.0, 1.0]), [0.25, 0.0, 0.0], "on the axis");
+    let site_at_zero = GraspSite::of(&bowl([0.0; 3]));
+    let almost = site_at_zero.offset_to(&grasp, [0.0, 1e-9, 0.0]);
+    assert_eq!(almost, [0.25, 0.0, 0.0], "a nanometre is on the axis");
     let can = GraspSite {
         class: GraspClass::Can,
         ..site

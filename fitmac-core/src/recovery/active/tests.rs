@@ -4,7 +4,7 @@ use super::*;
 use crate::{
     message::StateSample,
     params::Params,
-    signals::Signals,
+    signals::{Signals, TargetView},
     stand::{hand, surface, target},
 };
 
@@ -117,4 +117,61 @@ fn a_pick_leaves_the_place_its_share_of_the_budget() {
     }
     let spent = Step::Bottom(reason::BUDGET_EXHAUSTED);
     assert_eq!(active.step(&scene), spent);
+}
+
+/// How the correction grips a hand that stands like this.
+fn grips(active: &Active, state: GripperState) -> Grip {
+    let params = Params::guarded();
+    let sample = StateSample::default();
+    let signals = hand([0.4, 0.0, 0.3], state);
+    active.grip(&Scene::new(&params, &sample, &signals))
+}
+
+/// A correction just begun with the target so far away, its underside this high over the
+/// destination's surface.
+fn begun(routine: Routine, state: GripperState, distance_m: f64, above_m: f64) -> Active {
+    let params = Params::guarded();
+    let sample = StateSample::default();
+    let signals = Signals {
+        target: Some(TargetView {
+            distance_m,
+            ..target([0.4, 0.0, above_m])
+        }),
+        destination: Some(surface([0.4, 0.0, 0.0])),
+        ..hand([0.4, 0.0, above_m], state)
+    };
+    let scene = Scene {
+        destination_object: 3,
+        ..Scene::new(&params, &sample, &signals)
+    };
+    let mut active = Active::begin(&scene, routine, 100);
+    assert!(acts(active.step(&scene)));
+    active
+}
+
+#[test]
+fn a_hand_that_is_held_still_neither_drops_what_it_carries_nor_grips_what_it_let_go() {
+    use GripperState::{Closing, Empty, Holding, Open};
+    // High above the destination, and as high as it is let go: the view says that it touches.
+    let carry_m = Params::guarded().recovery.carry_m;
+    let carries = begun(Routine::Place, Holding, 0.0, 0.5 * carry_m);
+    assert_eq!(carries.running().sub_phase(), SubPhase::LiftCarry);
+    let let_go = begun(Routine::Place, Holding, 0.0, carry_m);
+    assert_eq!(let_go.running().sub_phase(), SubPhase::ReleaseReady);
+    // Above a target that is far, and closed on one that is in the hand.
+    let hovers = begun(Routine::Pick, Open, 1.0, 0.0);
+    assert_eq!(hovers.running().sub_phase(), SubPhase::ApproachHover);
+    let tests = begun(Routine::Pick, Holding, 0.0, 0.0);
+    assert_eq!(tests.running().sub_phase(), SubPhase::LiftTest);
+    for state in [Open, Closing, Holding, Empty] {
+        let as_it_stands = if state == Open {
+            Grip::Open
+        } else {
+            Grip::Close
+        };
+        assert_eq!(grips(&carries, state), Grip::Close, "{state:?}");
+        assert_eq!(grips(&let_go, state), as_it_stands, "{state:?}");
+        assert_eq!(grips(&hovers, state), as_it_stands, "{state:?}");
+        assert_eq!(grips(&tests, state), Grip::Close, "{state:?}");
+    }
 }

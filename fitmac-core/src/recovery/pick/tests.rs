@@ -138,12 +138,12 @@ fn what_is_held_is_set_down_before_the_hand_opens() {
         lowering: 0,
         opening: 0,
     });
-    for waiting in [&mut held, &mut low] {
+    for (waiting, z) in [(&mut held, 1.126), (&mut low, 1.125)] {
         for _ in 0..OPEN_QUERIES {
-            let open = Look::at([0.5, 0.0, 1.125], Holding).moves(waiting);
-            assert_eq!(open, Some(([0.5, 0.0, 1.125], Grip::Open)));
+            let open = Look::at([0.5, 0.0, z], Holding).moves(waiting);
+            assert_eq!(open, Some(([0.5, 0.0, z], Grip::Open)));
         }
-        assert_eq!(Look::at([0.5, 0.0, 1.125], Holding).moves(waiting), None);
+        assert_eq!(Look::at([0.5, 0.0, z], Holding).moves(waiting), None);
         assert_eq!(waiting.step, Step::Hover { turning: 0 });
     }
     let mut open = pick(Step::SetDown {
@@ -192,19 +192,25 @@ fn the_way_to_the_hover_leads_over_what_stands_between() {
         half_extent_m: [0.25, 0.25, 1.0],
         ..ObjectSample::default()
     };
-    let way = |ee_m| {
+    let way_past = |sample: &StateSample, ee_m| {
         let mut hover = pick(Step::Hover { turning: 0 });
-        let outcome = Look::at(ee_m, Open).see(&sample, |scene, target| hover.step(scene, target));
+        let outcome = Look::at(ee_m, Open).see(sample, |scene, target| hover.step(scene, target));
         match outcome {
             Flow::Done(Outcome::Act(motion)) => motion.waypoint_m,
             _ => panic!("it hovers"),
         }
     };
+    let way = |ee_m| way_past(&sample, ee_m);
     assert_eq!(way([4.0, 0.0, 2.374]), [4.0, 0.0, 2.5], "up first");
     assert_eq!(way([4.0, 0.0, 2.375]), [0.0, 0.0, 2.5], "then over");
     assert_eq!(way([0.501, 0.0, 1.0]), [0.0, 0.0, 1.0], "the box is behind");
     assert_eq!(way([0.5, 0.0, 3.0]), [0.0, 0.0, 1.0], "then down");
     assert_eq!(way([0.0, 4.0, 0.0]), [0.0, 0.0, 1.0], "nothing on the way");
+    // The same box beside the target: from half a metre on the hand is near and goes down.
+    let mut beside = sample;
+    beside.objects[0].position_m[0] = 0.25;
+    assert_eq!(way_past(&beside, [0.501, 0.0, 3.0]), [0.0, 0.0, 2.5]);
+    assert_eq!(way_past(&beside, [0.5, 0.0, 3.0]), [0.0, 0.0, 1.0]);
     sample.objects[0].id = 1;
     let mut hover = pick(Step::Hover { turning: 0 });
     let look = Look::at([4.0, 0.0, 0.0], Open);
