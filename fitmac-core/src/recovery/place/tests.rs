@@ -266,7 +266,7 @@ fn an_arm_that_is_blocked_near_the_surface_has_landed() {
         };
         lowers(&look, 0).1 == Step::ReleaseReady { at_m }
     };
-    assert!(opens(0.03125 + 0.0399, true) && !opens(0.03125 + 0.0401, true));
+    assert!(opens(0.03125 + 0.0399, true) && !opens(0.03125 + 0.04, true));
     assert!(!opens(0.03125 + 0.0399, false));
 }
 
