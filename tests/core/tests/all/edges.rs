@@ -122,6 +122,25 @@ fn a_rotation_that_is_no_number_gives_no_action() {
     }
 }
 
+#[test]
+fn a_waypoint_on_the_edge_of_the_workspace_is_in_it() {
+    let params = Params::guarded();
+    let edges = params.filter.workspace();
+    for axis in 0..3 {
+        for (edge, outwards) in edges.iter().zip([-1.0, 1.0]) {
+            let goes = |x: f64| {
+                let mut waypoint_m = EE_M;
+                waypoint_m[axis] = x;
+                let motion = Motion::to(waypoint_m, Grip::Open);
+                recovery_action(&params.action, &params.filter, EE_M, &motion).is_some()
+            };
+            assert!(goes(edge[axis]), "{axis} {outwards}");
+            assert!(!goes(edge[axis] + outwards * 1e-9), "{axis} {outwards}");
+            assert!(!goes(f64::NAN));
+        }
+    }
+}
+
 /// The turn about the vertical towards a box of these half extents, yawed by `yaw_rad` against a
 /// hand that points straight down.
 fn turn(half_extent_m: [f64; 3], yaw_rad: f64) -> f64 {
