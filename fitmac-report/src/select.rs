@@ -15,7 +15,7 @@ pub const SUITES: [&str; 2] = ["object", "spatial"];
 /// The surrogate that stands for the paper's main backbone.
 pub const MAIN: &str = "openvla-like";
 /// The level that tables are made of.
-const STANDARD: &str = "standard";
+pub const STANDARD: &str = "standard";
 /// The policy alone.
 pub const BASE: &str = "base";
 /// The whole controller.

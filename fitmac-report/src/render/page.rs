@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use sim_harness::evaluation::{EpisodeRecord, Failure, Profile};
 
 use crate::gallery::Frame;
-use crate::select::FULL;
+use crate::select::{FULL, MAIN, STANDARD};
 use crate::{Report, ReportError};
 
 /// Kinds of failures that the page shows pictures of, at most.
-const MOST_SHOWN: usize = 24;
+const MOST_SHOWN: usize = 40;
 /// The folder of pictures beside the page.
 const PICTURES: &str = "pictures";
 
@@ -42,8 +42,9 @@ pub fn page(report: &Report, path: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let shown = failures(report);
     if !shown.is_empty() {
         text.push_str(
-            "\n## Pictures of what still fails\n\nOne episode of each kind, played again: where \
-             the policy went wrong or FIT-MAC first acted, and the end.\n",
+            "\n## Pictures of what still fails\n\nOne episode of each kind, played again, those of \
+             the main table first: where the policy went wrong or FIT-MAC first acted, and the \
+             end.\n",
         );
     }
     for (at, (record, frames)) in shown.iter().enumerate() {
@@ -82,7 +83,10 @@ fn introduction(report: &Report) -> String {
 fn failures(report: &Report) -> Vec<(&EpisodeRecord, Vec<&Frame>)> {
     let mut kinds = BTreeSet::new();
     let mut shown = Vec::new();
-    for record in &report.episodes {
+    let mut records: Vec<&EpisodeRecord> = report.episodes.iter().collect();
+    // What the main table counts comes first; the sort is stable.
+    records.sort_by_key(|r| (r.backbone != MAIN, r.level != STANDARD));
+    for record in records {
         let own = record.config == FULL && record.profile == Profile::Guarded.name();
         let Some(frames) = report.pictures.get(&record.key()) else {
             continue;
