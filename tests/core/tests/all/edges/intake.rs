@@ -3,7 +3,10 @@
 use fitmac_core::{
     Controller, Params,
     intake::Refusal,
-    message::{ActionChunk, GroundingRecord, Input, ObjectSample, Plan, PolicyQuery, StateSample},
+    message::{
+        ActionChunk, GroundingRecord, Input, OBJECT_CAPACITY, ObjectSample, Plan, PolicyQuery,
+        StateSample,
+    },
     params::{OutOfRange, WhileRebinding},
     wire::{ActionFrame, ActionSpace, DestinationKind, GraspClass, PlaceRelation, Provenance},
 };
@@ -97,6 +100,21 @@ fn a_state_may_be_as_far_ahead_of_the_clock_as_the_skew() {
     assert_eq!(of_state(|s| s.stamp_ns = NOW_NS + skew), None);
     let ahead = of_state(|s| s.stamp_ns = NOW_NS + skew + 1);
     assert_eq!(ahead, Some(Refusal::FromFuture));
+}
+
+#[test]
+fn a_state_holds_as_many_objects_as_there_is_room_for() {
+    let full = |count: usize| {
+        of_state(|s| {
+            let first = s.objects[0];
+            for (object, id) in s.objects.iter_mut().zip(1..) {
+                *object = ObjectSample { id, ..first };
+            }
+            s.object_count = u32::try_from(count).expect("few");
+        })
+    };
+    assert_eq!(full(OBJECT_CAPACITY), None);
+    assert_eq!(full(OBJECT_CAPACITY + 1), Some(Refusal::TooLong));
 }
 
 #[test]
@@ -211,6 +229,36 @@ fn a_chunk_holds_one_action_at_least_and_as_many_as_there_is_room_for() {
 }
 
 #[test]
+fn a_chunk_of_another_space_or_frame_is_refused() {
+    let refused = Some(Refusal::Convention);
+    for code in (0..=u8::MAX).filter(|c| *c != ActionSpace::OscPoseDelta.code()) {
+        let known = ActionSpace::try_from(code).is_ok();
+        let why = of_chunk(MS, |c| c.action_space = code);
+        assert_eq!(
+            why,
+            if known {
+                refused
+            } else {
+                Some(Refusal::UnknownCode)
+            }
+        );
+    }
+    for code in (0..=u8::MAX).filter(|c| *c != ActionFrame::Base.code()) {
+        let known = ActionFrame::try_from(code).is_ok();
+        let why = of_chunk(MS, |c| c.frame = code);
+        assert_eq!(
+            why,
+            if known {
+                refused
+            } else {
+                Some(Refusal::UnknownCode)
+            }
+        );
+    }
+    assert_eq!(of_chunk(MS, |_| ()), None);
+}
+
+#[test]
 fn a_question_is_asked_again_after_the_time_of_a_hold_and_not_before() {
     let (mut controller, query) = asking();
     let hold = u64::from(params().chunk.hold_after_ms) * MS;
@@ -232,8 +280,8 @@ fn a_question_is_asked_again_after_the_time_of_a_hold_and_not_before() {
     assert_eq!(at(2 * hold), Some(query));
 }
 
-/// Why a record with a direct destination, changed by `change`, is refused.
-fn of_grounding(change: impl FnOnce(&mut GroundingRecord)) -> Option<Refusal> {
+/// A record with a direct destination.
+fn record() -> GroundingRecord {
     let mut record = GroundingRecord {
         sequence: 1,
         session: 1,
@@ -249,12 +297,64 @@ fn of_grounding(change: impl FnOnce(&mut GroundingRecord)) -> Option<Refusal> {
         ..GroundingRecord::default()
     };
     record.candidates[0].id = 1;
+    record
+}
+
+/// Why it is refused, changed by `change`.
+fn of_grounding(change: impl FnOnce(&mut GroundingRecord)) -> Option<Refusal> {
+    let mut record = record();
     change(&mut record);
     let input = Input {
         grounding: Some(&record),
         ..Input::default()
     };
     refusal(&mut controller(), NOW_NS, &input)
+}
+
+#[test]
+fn a_grounder_that_restarts_counts_from_its_own_beginning() {
+    let mut controller = controller();
+    let mut hear = |session, sequence| {
+        let record = GroundingRecord {
+            session,
+            sequence,
+            ..record()
+        };
+        let input = Input {
+            grounding: Some(&record),
+            ..Input::default()
+        };
+        controller.tick(NOW_NS, &input);
+        controller
+            .state()
+            .refusals()
+            .iter()
+            .map(|(_, n)| n)
+            .sum::<u32>()
+    };
+    assert_eq!(hear(1, 7), 0);
+    // The same number of another session is no repetition, and a lower one is not old.
+    assert_eq!(hear(2, 7), 0);
+    assert_eq!(hear(3, 1), 0);
+    assert_eq!(hear(3, 1), 1);
+}
+
+#[test]
+fn what_a_record_holds_beyond_its_candidates_leaves_no_trace() {
+    let after = |change: fn(&mut GroundingRecord)| {
+        let mut record = record();
+        change(&mut record);
+        let mut controller = controller();
+        let input = Input {
+            grounding: Some(&record),
+            ..Input::default()
+        };
+        controller.tick(NOW_NS, &input);
+        controller
+    };
+    let plain = after(|_| ());
+    assert!(after(|r| r.candidates[1].id = 9).state() == plain.state());
+    assert!(after(|r| r.candidates[0].id = 9).state() != plain.state());
 }
 
 #[test]
