@@ -60,9 +60,9 @@ fn short(source: Source<'_>, backbone: &str, setting: &Setting) -> Table {
         id: format!("ablation-{backbone}-{}", setting.slug()),
         title: format!("Modules, {backbone} surrogate: {}", setting.label()),
         caption: "Mean success rate over the five perturbations, as in the paper's Table 3; all \
-                  configurations on the same draws. Target correction is worth little here: what \
-                  it changes is the prompt, which the surrogates named after models follow in at \
-                  most 1 of 100 draws; a pick recovery goes to the grounded object without it."
+                  configurations on the same draws. What target correction changes is the prompt, \
+                  which the surrogates named after models follow in at most 1 of 100 draws; a pick \
+                  recovery goes to the grounded object without it."
             .to_owned(),
         rows_are: "configuration".to_owned(),
         columns: columns.map(|(g, n)| Column::new(g, n)).to_vec(),

@@ -269,7 +269,8 @@ pub fn displacement(source: Source<'_>, setting: &Setting) -> Option<Table> {
         title: format!("Displacement: {}", setting.label()),
         caption:
             "Success rate, %, over the distance by which the thing that Pos moves stands away \
-                  from where it stood in training. Not in the paper."
+                  from where it stood in training; on a full table the nearest distance that has \
+                  a free place, at most 5 cm off. Not in the paper."
                 .to_owned(),
         rows_are: "policy".to_owned(),
         columns: distances
