@@ -295,3 +295,6 @@ fn fill_mode(params: &Params, subtask: &Subtask, step: &Decided, rebound: bool) 
         FillMode::Base
     }
 }
+
+#[cfg(test)]
+mod tests;

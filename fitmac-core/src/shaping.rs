@@ -39,7 +39,6 @@ pub struct Shaper {
     rotation: Otg<3>,
     rotation_goal: Target<3>,
     rotation_base: UnitQuaternion,
-    goal_orientation: UnitQuaternion,
 }
 
 impl Shaper {
@@ -52,7 +51,6 @@ impl Shaper {
             rotation: Otg::new(State::at_rest([0.0; 3])),
             rotation_goal: Target::Stop,
             rotation_base: pose.orientation,
-            goal_orientation: pose.orientation,
         }
     }
 
@@ -75,13 +73,13 @@ impl Shaper {
         };
         if [rx, ry, rz] != [0.0; 3] {
             let turn = vector::scale([rx, ry, rz], params.action.rotation_rad);
-            self.goal_orientation =
-                UnitQuaternion::from_rotation_vector(turn) * hand(sample).orientation;
-            self.aim_rotation();
+            self.aim_rotation(
+                UnitQuaternion::from_rotation_vector(turn) * hand(sample).orientation,
+            );
         }
     }
 
-    fn aim_rotation(&mut self) {
+    fn aim_rotation(&mut self, goal: UnitQuaternion) {
         // At rest the base may move along, so that the rotation vector stays short.
         if self.rotation.state().velocity == [0.0; 3]
             && self.rotation.state().acceleration == [0.0; 3]
@@ -89,7 +87,7 @@ impl Shaper {
             self.rotation_base = self.orientation();
             self.rotation = Otg::new(State::at_rest([0.0; 3]));
         }
-        let position = (self.goal_orientation * self.rotation_base.inverse()).to_rotation_vector();
+        let position = (goal * self.rotation_base.inverse()).to_rotation_vector();
         self.rotation_goal = Target::Reach {
             position,
             velocity: [0.0; 3],
@@ -109,7 +107,6 @@ impl Shaper {
     pub(crate) fn halt(&mut self) {
         self.translation_goal = Target::Stop;
         self.rotation_goal = Target::Stop;
-        self.goal_orientation = self.orientation();
     }
 
     fn orientation(&self) -> UnitQuaternion {

@@ -215,6 +215,11 @@ fn another_object_is_held_when_it_rises_with_the_closed_hand() {
     );
     stand.step(&sees_another(GripperState::Holding, 0.126, 0.125, 1.0));
     assert_eq!(stand.attempt.held_other(), Some((2, 1.0)));
+    // Another one that is higher has not risen.
+    let mut third = sees_another(GripperState::Holding, 0.5, 0.125, 2.0);
+    third.other = third.other.map(|o| OtherView { id: 3, ..o });
+    assert_eq!(stand.step(&third) & WRONG_OBJECT_HELD, 0);
+    assert_eq!(stand.attempt.held_other(), Some((3, 2.0)));
 }
 
 #[test]

@@ -116,7 +116,7 @@ impl Controller {
                 false,
             );
         };
-        if mode >= Mode::Hold && state.mode < Mode::Hold {
+        if mode >= Mode::Hold {
             shaper.halt();
         }
         let wanted = shaper.step(params, dt_s);

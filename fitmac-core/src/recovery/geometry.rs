@@ -80,9 +80,13 @@ pub fn grasp_point(
 }
 
 /// The freer side of a rim, the nearer one if both are free. A hand that is
-/// under way changes what is near: the choice is to be made once.
+/// under way changes what is near: the choice is to be made once. What is
+/// grasped at its axis has one side.
 #[must_use]
 pub fn better_side(params: &Grasp, sample: &StateSample, target: &TargetView) -> Side {
+    if target.class != GraspClass::Bowl {
+        return Side::Positive;
+    }
     let cost = |side| {
         let p = grasp_point(params, sample, target, side);
         (
@@ -105,8 +109,8 @@ fn crowd(sample: &StateSample, target: ObjectId, p: Vector3) -> u32 {
         let [dx, dy, _] = vector::sub(object.position_m, p);
         let [hx, hy, _] = object.half_extent_m;
         let reach = hx.max(hy) + 0.02;
-        let top = object.position_m[2] + half_height(object);
-        if object.id != target && top > p[2] - 0.02 && dx * dx + dy * dy < reach * reach {
+        let near = object.id != target && dx * dx + dy * dy < reach * reach;
+        if near && object.position_m[2] + half_height(object) > p[2] - 0.02 {
             count += 1;
         }
     }
@@ -138,9 +142,9 @@ pub fn path_top(
         let (rx, ry) = (ox - along * dx, oy - along * dy);
         let [hx, hy, _] = object.half_extent_m;
         let reach = hx.max(hy) + SWEEP_M;
-        let top = from[2] + oz + half_height(object);
-        if rx * rx + ry * ry < reach * reach && highest.is_none_or(|h| top > h) {
-            highest = Some(top);
+        if rx * rx + ry * ry < reach * reach {
+            let top = from[2] + oz + half_height(object);
+            highest = Some(highest.map_or(top, |h| h.max(top)));
         }
     }
     highest

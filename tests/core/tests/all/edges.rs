@@ -1,12 +1,13 @@
 //! Single functions at the edges of what they take, where no session leads.
 
 mod intake;
+mod params;
+mod steady;
 
 use fitmac_core::{
     Controller, Params,
     filter::{Commanded, limit_action},
-    message::{Input, StateSample},
-    params::PolicyGripper,
+    message::{Command, Input, StateSample},
     recovery::{
         geometry::levelling,
         waypoint::{Grip, Motion, recovery_action},
@@ -25,36 +26,16 @@ fn a_code_without_a_member_says_of_which_vocabulary() {
     assert_eq!(error.to_string(), "Phase has no member 200");
 }
 
+/// Programs in other languages read them too.
 #[test]
-fn an_assignment_that_fails_says_why() {
-    let mut params = Params::guarded();
-    let mut says = |key: &str, text: &str| params.assign(key, text).map_err(|e| e.to_string());
-    let unknown = Err("there is no such parameter".to_owned());
-    let no_value = Err("the text is no value of the parameter's type".to_owned());
-    for key in [
-        "gate.nothing",
-        "nothing.at_all",
-        "switches.nothing",
-        "nothing",
-    ] {
-        assert_eq!(says(key, "1"), unknown, "{key}");
-    }
-    for key in [
-        "gate.failure_streak",
-        "switches.hard_pick",
-        "policy_gripper",
-    ] {
-        assert_eq!(says(key, "perhaps"), no_value, "{key}");
-    }
-}
-
-#[test]
-fn a_convention_can_be_assigned_and_taken_back() {
-    let mut params = Params::guarded();
-    assert_eq!(params.assign("policy_gripper", "one_open"), Ok(()));
-    assert_eq!(params.policy_gripper, PolicyGripper::OneOpen);
-    assert_eq!(params.assign("policy_gripper", "minus_one_open"), Ok(()));
-    assert_eq!(params, Params::guarded());
+fn a_commands_flags_are_the_four_lowest_bits() {
+    let flags = [
+        Command::CLAMPED,
+        Command::LIMITED,
+        Command::LAST,
+        Command::FROM_POLICY,
+    ];
+    assert_eq!(flags, [1, 2, 4, 8]);
 }
 
 #[test]

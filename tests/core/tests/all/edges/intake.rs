@@ -2,7 +2,7 @@
 
 use fitmac_core::{
     Controller, Params,
-    intake::Refusal,
+    intake::{Refusal, is_newer},
     message::{
         ActionChunk, GroundingRecord, Input, OBJECT_CAPACITY, ObjectSample, Plan, PolicyQuery,
         StateSample,
@@ -309,6 +309,19 @@ fn of_grounding(change: impl FnOnce(&mut GroundingRecord)) -> Option<Refusal> {
         ..Input::default()
     };
     refusal(&mut controller(), NOW_NS, &input)
+}
+
+#[test]
+fn a_number_is_newer_up_to_half_of_all_numbers_ahead() {
+    const HALF: u64 = 1 << 63;
+    for last in [0, 1, HALF - 1, HALF, u64::MAX] {
+        let newer = |ahead: u64| is_newer(last.wrapping_add(ahead), last);
+        assert!(!newer(0));
+        assert!(newer(1));
+        assert!(newer(HALF - 1));
+        assert!(!newer(HALF), "as far ahead as behind");
+        assert!(!newer(u64::MAX));
+    }
 }
 
 #[test]
