@@ -263,9 +263,9 @@ pub(crate) struct Wanted {
 
 fn check_form(params: &Params, chunk: &ActionChunk) -> Result<(), Refusal> {
     let n = chunk.horizon as usize;
-    if n > CHUNK_CAPACITY {
+    let Some(actions) = chunk.actions.get(..n) else {
         return Err(Refusal::TooLong);
-    }
+    };
     if n == 0 {
         return Err(Refusal::Empty);
     }
@@ -278,16 +278,23 @@ fn check_form(params: &Params, chunk: &ActionChunk) -> Result<(), Refusal> {
     {
         return Err(Refusal::Convention);
     }
-    let actions = chunk.actions.iter().take(n);
-    if !actions.clone().flatten().all(|x| x.is_finite()) {
+    let largest = largest(actions);
+    if !largest.is_finite() {
         return Err(Refusal::NotFinite);
     }
     let limit = 1.0 + params.chunk.range_tolerance;
     let refuse = params.out_of_range == OutOfRange::Refuse;
-    if refuse && actions.flatten().any(|&x| f64::from(x).abs() > limit) {
+    if refuse && f64::from(largest) > limit {
         return Err(Refusal::OutOfRange);
     }
     Ok(())
+}
+
+/// The largest magnitude; not finite if any number is not: the bits of
+/// magnitudes are ordered as they are, infinity and NaN above all.
+fn largest(actions: &[[f32; ACTION_DIM]]) -> f32 {
+    let magnitudes = actions.as_flattened().iter().map(|x| x.abs().to_bits());
+    f32::from_bits(magnitudes.fold(0, u32::max))
 }
 
 fn check_age(params: &Params, now_ns: u64, chunk: &ActionChunk) -> Result<(), Refusal> {

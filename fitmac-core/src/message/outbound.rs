@@ -203,3 +203,20 @@ pub struct TraceRecord {
     pub action: Action,
 }
 assert_packed!(TraceRecord = 56 + 24 + 16 + 32 + 72 + 16 * ACTION_DIM);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Programs in other languages read them too.
+    #[test]
+    fn the_flags_are_the_four_lowest_bits() {
+        let flags = [
+            Command::CLAMPED,
+            Command::LIMITED,
+            Command::LAST,
+            Command::FROM_POLICY,
+        ];
+        assert_eq!(flags, [1, 2, 4, 8]);
+    }
+}

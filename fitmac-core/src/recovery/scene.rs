@@ -74,6 +74,7 @@ impl<'a> Scene<'a> {
             .zip(limits)
             .any(|(&q, [lower, upper])| q < lower + margin || q > upper - margin)
     }
+
     /// A pick may be followed by a place of our own.
     pub(super) const fn may_place(&self) -> bool {
         self.params.switches.hard_place && self.destination_object != 0

@@ -41,6 +41,7 @@ impl Stuck {
     pub(super) fn note(&mut self, ee_m: Vector3, [x, y, z, ..]: &Action) {
         self.pushed_from_m = (vector::norm([*x, *y, *z]) > PUSHING).then_some(ee_m);
     }
+
     /// The arm has stood still under command for as long as it may.
     pub(super) const fn is_blocked(&self, patience: u32) -> bool {
         self.queries >= patience

@@ -7,7 +7,7 @@ mod steady;
 use fitmac_core::{
     Controller, Params,
     filter::{Commanded, limit_action},
-    message::{Command, Input, StateSample},
+    message::{Input, StateSample},
     recovery::{
         geometry::levelling,
         waypoint::{Grip, Motion, recovery_action},
@@ -24,18 +24,6 @@ const EE_M: [f64; 3] = [0.4, 0.0, 0.3];
 fn a_code_without_a_member_says_of_which_vocabulary() {
     let error = Phase::try_from(200).expect_err("no such phase");
     assert_eq!(error.to_string(), "Phase has no member 200");
-}
-
-/// Programs in other languages read them too.
-#[test]
-fn a_commands_flags_are_the_four_lowest_bits() {
-    let flags = [
-        Command::CLAMPED,
-        Command::LIMITED,
-        Command::LAST,
-        Command::FROM_POLICY,
-    ];
-    assert_eq!(flags, [1, 2, 4, 8]);
 }
 
 #[test]
