@@ -36,9 +36,10 @@ const VERSION: &str = "27.1.0";
 /// Arguments of the test program, one run each, what notices most in the least time first. The
 /// swarm and the raw bytes are left out: they look for broken invariants only, and need many ticks
 /// for it.
-const FIRST: [&[&str]; 2] = [
+const FIRST: [&[&str]; 3] = [
+    &["edges::", "profiles::"],
     &["quick::"],
-    &["recoveries::", "table_19::", "edges::", "profiles::"],
+    &["recoveries::", "table_19::"],
 ];
 const LAST: [&[&str]; 2] = [&["soak::"], &["invariants::"]];
 /// Longest that a run may take on a busy machine, s: some twenty times what it takes.
