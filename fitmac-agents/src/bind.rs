@@ -26,9 +26,6 @@ pub struct RecordHeader {
     pub provenance: Provenance,
 }
 
-/// Least weight at which a candidate counts as compatible.
-const COMPATIBLE_WEIGHT: f64 = 0.35;
-
 /// The controller's view of a plan.
 #[must_use]
 pub fn plan(id: u64, plan: &TaskPlan) -> message::Plan {
@@ -68,9 +65,12 @@ pub fn record(header: &RecordHeader, grounding: &Grounding) -> GroundingRecord {
         .iter()
         .filter(|candidate| candidate.seen.id != 0);
     for (slot, candidate) in record.candidates.iter_mut().zip(named) {
+        // What was chosen is what the instruction is taken to mean, however
+        // badly it fits.
+        let fits = candidate.seen.id == record.target || candidate.fits();
         *slot = message::Candidate {
             id: candidate.seen.id,
-            compatible: u8::from(candidate.weight >= COMPATIBLE_WEIGHT),
+            compatible: u8::from(fits),
             reserved: [0; 5],
             confidence: candidate.weight.clamp(0.0, 1.0),
         };
@@ -108,5 +108,56 @@ pub fn critic_label(label: FailureType) -> CriticLabel {
         FailureType::TargetFailure => CriticLabel::TargetFailure,
         FailureType::ExecutionFailure => CriticLabel::ExecutionFailure,
         FailureType::Success => CriticLabel::Success,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grounder::{Candidate, Seen, Verdict};
+
+    #[test]
+    fn the_chosen_one_fits_the_instruction_however_unsure_the_detector_is() {
+        let candidate = |id: u16, name_score, relation_score| Candidate {
+            seen: Seen {
+                index: usize::from(id) - 1,
+                id,
+                label: "bowl".to_owned(),
+                box_px: None,
+            },
+            name_score,
+            relation_score,
+            weight: 0.1 * name_score * relation_score,
+        };
+        let grounding = Grounding {
+            candidates: vec![
+                candidate(1, 1.0, 0.2),
+                candidate(2, 1.0, 0.3),
+                candidate(3, 1.0, 0.9),
+            ],
+            references: Vec::new(),
+            context: Vec::new(),
+            selected_index: Some(0),
+            confidence: 0.4,
+            reason: String::new(),
+            verdict: Verdict::Unsatisfied,
+            destination: Destination::None,
+        };
+        let header = RecordHeader {
+            sequence: 1,
+            session: 1,
+            stamp_ns: 0,
+            epoch: 1,
+            subtask: 0,
+            prompt_id: 1,
+            provenance: Provenance::Rules,
+        };
+        let record = record(&header, &grounding);
+        let fits: Vec<(u16, u8)> = record.candidates[..3]
+            .iter()
+            .map(|c| (c.id, c.compatible))
+            .collect();
+        assert_eq!(record.target, 1);
+        assert_eq!(fits, [(1, 1), (2, 0), (3, 1)]);
     }
 }

@@ -97,6 +97,10 @@ pub struct Detection {
     pub position_m: [f64; 3],
     /// Extents of the bounding box along the base axes, m.
     pub size_m: [f64; 3],
+    /// Orientation of the object's own frame in the base frame, as the pose source has it: unit
+    /// quaternion w, x, y, z. Without it the frame lies along the base axes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orientation: Option<[f64; 4]>,
     /// Box in the image: x and y of the upper left corner, width, height, px.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub box_px: Option<[f64; 4]>,
@@ -278,6 +282,15 @@ fn check_detection(detection: &Detection, at: &str) -> Result<(), SceneError> {
     check_position(&detection.position_m, &format!("{at}.position_m"))?;
     check_size(&detection.size_m, &format!("{at}.size_m"))?;
     if detection
+        .orientation
+        .is_some_and(|wxyz| !is_unit_quaternion(&wxyz))
+    {
+        return Err(field(
+            format!("{at}.orientation"),
+            "must be a unit quaternion w, x, y, z",
+        ));
+    }
+    if detection
         .box_px
         .is_some_and(|pixels| !pixels.iter().all(|value| value.is_finite()))
     {
@@ -293,6 +306,11 @@ fn check_detection(detection: &Detection, at: &str) -> Result<(), SceneError> {
         check_size(&part.size_m, &format!("{at}.size_m"))?;
     }
     Ok(())
+}
+
+fn is_unit_quaternion(wxyz: &[f64; 4]) -> bool {
+    let square: f64 = wxyz.iter().map(|x| x * x).sum();
+    (square - 1.0).abs() <= 1e-3
 }
 
 fn check_label(label: &str, at: &str) -> Result<(), SceneError> {

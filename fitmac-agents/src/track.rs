@@ -298,6 +298,7 @@ mod tests {
             confidence: 0.8,
             position_m: [x_m, y_m, 0.025],
             size_m: [0.107, 0.107, 0.05],
+            orientation: None,
             box_px: None,
             colour: None,
             parts: Vec::new(),

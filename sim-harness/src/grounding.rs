@@ -1,10 +1,11 @@
 //! The project's own planner and grounder, looking through a pose source.
 
-use fitmac_agents::grounder::{self, Context, Destination, Grounding};
-use fitmac_agents::planner::{self, Relation, TaskPlan};
+use fitmac_agents::bind::{self, RecordHeader};
+use fitmac_agents::grounder::{self, Context};
+use fitmac_agents::planner::{self, TaskPlan};
 use fitmac_agents::scene::{Detection, Part, Scene as SeenScene, Table};
-use fitmac_core::message::{CANDIDATE_CAPACITY, Candidate, GroundingRecord, Plan};
-use fitmac_core::wire::{DestinationKind, PlaceRelation, Provenance};
+use fitmac_core::message::{GroundingRecord, Plan};
+use fitmac_core::wire::Provenance;
 
 use crate::agents::{Agents, Occasion, View};
 use crate::error::SimError;
@@ -13,8 +14,6 @@ use crate::scene::{PlacedObject, TABLE_CENTRE_M, TABLE_HALF_M};
 
 /// Confidence of a pose that the newest frame did not show, as a share of the last one.
 const UNSEEN_SHARE: f64 = 0.7;
-/// Least product of the scores of name and relation at which a candidate fits the instruction.
-const COMPATIBLE: f64 = 0.35;
 /// The prompt that names the grounded target; prompt 0 is the instruction as given.
 const GROUNDED_PROMPT: u32 = 1;
 
@@ -47,15 +46,10 @@ impl Agents for RuleAgents {
         // What can't be read at all leaves control with the base policy.
         let plan = planner::plan(instruction)
             .unwrap_or_else(|_| TaskPlan::unknown(instruction, 0.0, Vec::new()));
-        let subtasks = u32::try_from(plan.subtasks.len()).unwrap_or(u32::MAX);
-        let confidence = (plan.confidence.clamp(0.0, 1.0) * 1000.0) as u32;
+        let told = bind::plan(1, &plan);
         self.plan = Some(plan);
         self.prompt = None;
-        Plan {
-            id: 1,
-            subtask_count: subtasks.max(1),
-            confidence_permille: confidence,
-        }
+        told
     }
 
     fn ground(
@@ -114,17 +108,25 @@ impl RuleAgents {
             ..*view
         };
         let grounding = grounder::ground(step, &seen_scene(&then), &Context::default());
-        let mut record = record_of(&grounding, &then);
-        record.epoch = epoch;
-        record.subtask = subtask;
-        record.provenance = Provenance::Rules.code();
-        if let Occasion::Rebind { suspect } = occasion
-            && suspect != 0
-        {
-            record.provenance = Provenance::Recheck.code();
-            record.prompt_id = GROUNDED_PROMPT;
+        let again = matches!(occasion, Occasion::Rebind { suspect } if suspect != 0);
+        if again {
             self.prompt = Some(step.text.clone());
         }
+        // The sequence number, session and stamp are the caller's.
+        let header = RecordHeader {
+            sequence: 0,
+            session: 0,
+            stamp_ns: 0,
+            epoch,
+            subtask,
+            prompt_id: if again { GROUNDED_PROMPT } else { 0 },
+            provenance: if again {
+                Provenance::Recheck
+            } else {
+                Provenance::Rules
+            },
+        };
+        let record = bind::record(&header, &grounding);
         let target = view.sightings.iter().find(|s| s.id == record.target);
         self.bound = target.map(|t| (record, t.confidence));
         Some(record)
@@ -201,77 +203,12 @@ fn detection(view: &View<'_>, placed: &PlacedObject, sighting: &Sighting) -> Det
         label: named.kind.label.clone(),
         confidence: share * sighting.confidence,
         position_m: sighting.pose.position_m,
-        size_m: extent_m(placed, sighting),
+        size_m: sighting.pose.extent_m(placed.kind.half_extent_m()),
+        orientation: Some(sighting.pose.orientation),
         box_px: None,
         colour: None,
         parts: Vec::new(),
     }
-}
-
-/// Extents along the base axes of the object's turned bounding box, m.
-fn extent_m(placed: &PlacedObject, sighting: &Sighting) -> [f64; 3] {
-    let turn = sighting.pose.isometry().rotation.to_rotation_matrix();
-    let half = placed.kind.half_extent_m();
-    std::array::from_fn(|row| 2.0 * (0..3).map(|k| turn[(row, k)].abs() * half[k]).sum::<f64>())
-}
-
-/// The grounder's answer as a message; epoch, subtask and provenance are left to the caller.
-#[must_use]
-pub fn record_of(grounding: &Grounding, view: &View<'_>) -> GroundingRecord {
-    let mut record = GroundingRecord {
-        target: grounding
-            .selected()
-            .map_or(0, |candidate| candidate.seen.id),
-        confidence: grounding.confidence,
-        ..GroundingRecord::default()
-    };
-    for (slot, candidate) in record.candidates.iter_mut().zip(&grounding.candidates) {
-        // What was chosen is what the instruction is taken to mean, however badly it fits.
-        let fits = candidate.seen.id == record.target
-            || candidate.name_score * candidate.relation_score >= COMPATIBLE;
-        *slot = Candidate {
-            id: candidate.seen.id,
-            compatible: u8::from(fits),
-            reserved: [0; 5],
-            confidence: candidate.weight,
-        };
-    }
-    let count = grounding.candidates.len().min(CANDIDATE_CAPACITY);
-    record.candidate_count = u8::try_from(count).unwrap_or(u8::MAX);
-    match &grounding.destination {
-        Destination::None => record.destination_kind = DestinationKind::Unresolved.code(),
-        Destination::Relational { .. } => {
-            record.destination_kind = DestinationKind::Relational.code();
-        }
-        Destination::Direct(anchor) => {
-            record.destination_kind = DestinationKind::Direct.code();
-            record.destination = anchor.id;
-            let inside = anchor.relation == Relation::In;
-            record.relation = if inside {
-                PlaceRelation::In
-            } else {
-                PlaceRelation::On
-            }
-            .code();
-            record.region_offset_m = in_frame_of(view, anchor.id, anchor.region_offset_m);
-            record.region_half_extent_m = anchor.region_half_extent_m;
-        }
-    }
-    record
-}
-
-/// A vector along the base axes, in the frame of an object.
-fn in_frame_of(view: &View<'_>, id: u16, vector_m: [f64; 3]) -> [f64; 3] {
-    view.sightings
-        .iter()
-        .find(|s| s.id == id)
-        .map_or(vector_m, |s| {
-            s.pose
-                .isometry()
-                .rotation
-                .inverse_transform_vector(&vector_m.into())
-                .into()
-        })
 }
 
 /// Checks that the planner and grounder single out the objects that a task means, in a scene as it

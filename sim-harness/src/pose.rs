@@ -49,6 +49,14 @@ impl Pose {
         }
     }
 
+    /// Extents along the base axes, m, of a box of these half extents with this orientation.
+    #[must_use]
+    pub fn extent_m(&self, half_extent_m: [f64; 3]) -> [f64; 3] {
+        let turn = self.isometry().rotation.to_rotation_matrix();
+        let along = |row: usize| (0..3).map(move |k| turn[(row, k)].abs() * half_extent_m[k]);
+        std::array::from_fn(|row| 2.0 * along(row).sum::<f64>())
+    }
+
     /// Cosine of the angle between this pose's z axis and the vertical: 1 is upright.
     #[must_use]
     pub fn uprightness(&self) -> f64 {

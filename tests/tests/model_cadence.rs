@@ -44,6 +44,7 @@ fn bowl(y_m: f64) -> Detection {
         confidence: 0.9,
         position_m: [0.5, y_m, 0.025],
         size_m: [0.1, 0.1, 0.05],
+        orientation: None,
         box_px: None,
         colour: None,
         parts: Vec::new(),

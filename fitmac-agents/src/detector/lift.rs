@@ -49,6 +49,7 @@ pub fn lift(view: &View<'_>, camera: &Camera, found: &ImageBox) -> Option<Detect
         confidence: found.confidence.clamp(0.0, 1.0),
         position_m: centre,
         size_m: [width_m, width_m, height_m],
+        orientation: None,
         box_px: Some(found.box_px),
         colour: None,
         parts: Vec::new(),

@@ -1,5 +1,6 @@
 //! Where the object goes: a direct anchor, or a relation left to the policy.
 
+use kinematics::rotation::UnitQuaternion;
 use serde::Serialize;
 
 use crate::planner::{Relation, SpatialPhrase};
@@ -37,12 +38,12 @@ pub struct Anchor {
     pub relation: Relation,
     /// Its centre in the base frame, m.
     pub position_m: [f64; 3],
-    /// Centre of the destination region from the anchor's centre, along the
-    /// base axes, m: on a surface, z is the surface; in a container, z is the
-    /// rim.
+    /// Centre of the destination region in the anchor's frame, m: on a
+    /// surface, z is the surface; in a container, z is the rim.
     pub region_offset_m: [f64; 3],
-    /// Half extent of the region in x and y, and the depth of a container (0 on
-    /// a surface), m.
+    /// Half extent of the region in x and y of the anchor, and the depth of a
+    /// container (0 on a surface), m. Detections tell extents along the base
+    /// axes: here they are those of the nearest quarter turn.
     pub region_half_extent_m: [f64; 3],
     /// True if the anchor is a fixture.
     pub fixture: bool,
@@ -110,20 +111,27 @@ fn anchor(pool: &Pool<'_>, thing: Thing, volume: &Volume, relation: Relation) ->
         Thing::Table => return None,
     };
     let [size_x, size_y, size_z] = volume.size_m;
+    let frame = detection.orientation.and_then(UnitQuaternion::from_wxyz);
+    let frame = frame.unwrap_or(UnitQuaternion::IDENTITY);
+    let [along_x, along_y] = if crossed(frame) {
+        [size_y, size_x]
+    } else {
+        [size_x, size_y]
+    };
     let top = volume.centre_m[2] + size_z / 2.0;
     Some(Anchor {
         id: detection.id,
         label,
         relation,
         position_m: detection.position_m,
-        region_offset_m: [
+        region_offset_m: frame.inverse().rotate([
             volume.centre_m[0] - detection.position_m[0],
             volume.centre_m[1] - detection.position_m[1],
             top - detection.position_m[2],
-        ],
+        ]),
         region_half_extent_m: [
-            size_x / 2.0,
-            size_y / 2.0,
+            along_x / 2.0,
+            along_y / 2.0,
             if relation == Relation::In {
                 size_z
             } else {
@@ -132,4 +140,10 @@ fn anchor(pool: &Pool<'_>, thing: Thing, volume: &Volume, relation: Relation) ->
         ],
         fixture,
     })
+}
+
+/// True if its x axis lies nearer to the base's y axis than to the base's x axis.
+fn crossed(frame: UnitQuaternion) -> bool {
+    let [x, y, _] = frame.rotate([1.0, 0.0, 0.0]);
+    y.abs() > x.abs()
 }

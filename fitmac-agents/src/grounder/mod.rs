@@ -104,6 +104,14 @@ pub struct Candidate {
     pub weight: f64,
 }
 
+impl Candidate {
+    /// Name and relation fit the instruction, whatever the detector's confidence.
+    #[must_use]
+    pub fn fits(&self) -> bool {
+        self.name_score * self.relation_score >= FIT_MIN
+    }
+}
+
 /// The grounder's answer.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Grounding {

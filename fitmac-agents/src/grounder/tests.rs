@@ -10,6 +10,7 @@ fn thing(label: &str, position_m: [f64; 3], size_m: [f64; 3]) -> Detection {
         confidence: 0.9,
         position_m,
         size_m,
+        orientation: None,
         box_px: None,
         colour: None,
         parts: Vec::new(),
@@ -233,6 +234,47 @@ fn a_relational_destination_is_no_anchor() {
 }
 
 #[test]
+fn a_region_lies_in_the_frame_of_its_anchor_however_it_is_turned() {
+    let anchor = |orientation| {
+        let mut scene = spatial([[0.5, 0.0, 0.025], [0.35, 0.3, 0.065]]);
+        scene.fixtures[0].orientation = orientation;
+        let text = "put the ramekin in the top drawer of the wooden cabinet";
+        match select(text, &scene).destination {
+            Destination::Direct(anchor) => anchor,
+            other => panic!("{other:?}"),
+        }
+    };
+    let half = core::f64::consts::FRAC_1_SQRT_2;
+    // The drawer is 5 cm along the base's y axis; a quarter turn makes that the cabinet's x.
+    for (orientation, offset_m, half_m) in [
+        (None, [0.0, 0.05, 0.105], [0.11, 0.125, 0.07]),
+        (
+            Some([half, 0.0, 0.0, half]),
+            [0.05, 0.0, 0.105],
+            [0.125, 0.11, 0.07],
+        ),
+        (
+            Some([half, 0.0, 0.0, -half]),
+            [-0.05, 0.0, 0.105],
+            [0.125, 0.11, 0.07],
+        ),
+        (
+            Some([0.0, 0.0, 0.0, 1.0]),
+            [0.0, -0.05, 0.105],
+            [0.11, 0.125, 0.07],
+        ),
+    ] {
+        let found = anchor(orientation);
+        for axis in 0..3 {
+            let miss = found.region_offset_m[axis] - offset_m[axis];
+            assert!(miss.abs() < 1e-12, "{orientation:?}: {found:?}");
+            let miss = found.region_half_extent_m[axis] - half_m[axis];
+            assert!(miss.abs() < 1e-12, "{orientation:?}: {found:?}");
+        }
+    }
+}
+
+#[test]
 fn bad_scenes_name_their_field() {
     let good =
         serde_json::to_string(&spatial([[0.5, 0.0, 0.025], [0.35, 0.3, 0.065]])).expect("json");
@@ -248,6 +290,11 @@ fn bad_scenes_name_their_field() {
         ("akita_black_bowl", "bowl\\u0007", "objects[0].label"),
         ("\"objects\"", "\"things\"", "things"),
         ("\"id\":0", "\"id\":70000", "70000"),
+        (
+            "\"size_m\":[0.107,0.107,0.05]",
+            "\"size_m\":[0.107,0.107,0.05],\"orientation\":[1,1,0,0]",
+            "objects[0].orientation",
+        ),
         (
             "\"half_extent_m\":[0.4",
             "\"half_extent_m\":[-1",

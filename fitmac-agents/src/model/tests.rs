@@ -136,6 +136,7 @@ fn two_bowls(label: &str) -> Scene {
         confidence: 0.8,
         position_m: [0.5, y, 0.025],
         size_m: [0.1, 0.1, 0.05],
+        orientation: None,
         box_px: Some([10.0, 10.0 + 100.0 * y, 20.0, 20.0]),
         colour: None,
         parts: Vec::new(),

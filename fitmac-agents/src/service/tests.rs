@@ -12,6 +12,7 @@ fn thing(id: u16, label: &str, at: [f64; 2], size_m: [f64; 3]) -> Detection {
         confidence: 0.85,
         position_m: [at[0], at[1], size_m[2] / 2.0],
         size_m,
+        orientation: None,
         box_px: None,
         colour: None,
         parts: Vec::new(),

@@ -68,6 +68,7 @@ pub(super) fn fixture(label: &str, position_m: [f64; 3], size_m: [f64; 3]) -> De
         confidence: 1.0,
         position_m,
         size_m,
+        orientation: None,
         box_px: None,
         colour: None,
         parts: Vec::new(),

@@ -14,10 +14,7 @@ use fitmac_agents::{
     scene::{Detection, Scene, Table},
     service::{AgentService, Event, ServiceParams},
 };
-use fitmac_core::{
-    message::{ObjectSample, StateSample},
-    wire::GraspClass,
-};
+use fitmac_core::{message::StateSample, wire::GraspClass};
 use fitmac_rt::{
     clock,
     endpoint::AgentsEndpoint,
@@ -197,12 +194,17 @@ fn seen(sample: &StateSample, card: &Card) -> Scene {
             continue;
         };
         let is_fixture = GraspClass::try_from(object.grasp_class) == Ok(GraspClass::Fixture);
+        let pose = Pose {
+            position_m: object.position_m,
+            orientation: object.orientation,
+        };
         let detection = Detection {
             id: object.id,
             label: look.label.clone(),
             confidence: object.confidence,
             position_m: object.position_m,
-            size_m: extent_m(object),
+            size_m: pose.extent_m(object.half_extent_m),
+            orientation: Some(object.orientation),
             box_px: None,
             colour: None,
             parts: Vec::new(),
@@ -225,18 +227,4 @@ fn seen(sample: &StateSample, card: &Card) -> Scene {
         objects,
         fixtures,
     }
-}
-
-/// Extents along the base axes of a box that is turned, m.
-fn extent_m(object: &ObjectSample) -> [f64; 3] {
-    let pose = Pose {
-        position_m: object.position_m,
-        orientation: object.orientation,
-    };
-    let turn = pose.isometry().rotation.to_rotation_matrix();
-    std::array::from_fn(|row| {
-        2.0 * (0..3)
-            .map(|k| turn[(row, k)].abs() * object.half_extent_m[k])
-            .sum::<f64>()
-    })
 }

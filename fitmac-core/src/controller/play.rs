@@ -76,7 +76,7 @@ impl Controller {
         state.observed = seen;
         let width_before = state.width_m.unwrap_or(sample.gripper_width_m);
         let [.., grip] = state.current.action;
-        let commanded_closed = state.current.policy_step > 0 && grip > 0.0;
+        let commanded_closed = grip > 0.0;
         let verdict = state.verdicts.verdict();
         state
             .subtask

@@ -108,7 +108,7 @@ fn one_of<T: Copy>(rng: &mut ChaCha8Rng, choices: &[T], or: T) -> T {
     choices.choose(rng).copied().unwrap_or(or)
 }
 
-/// Most draws of a set of parameters that holds together; some in a hundred do not.
+/// Most draws until a set of parameters holds together.
 const DRAWS: u32 = 1000;
 
 /// Parameters around one of the profiles.
