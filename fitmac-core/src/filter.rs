@@ -2,9 +2,10 @@
 //! limits, not reasons.
 //!
 //! Two things pass it. The action of a policy step: finite, inside the action
-//! box, not further out of the workspace. And the setpoint of a tick: finite,
-//! inside the workspace, and within velocity, acceleration and jerk of the
-//! last *command*, whatever was measured meanwhile.
+//! box, not out of the workspace. And the setpoint of a tick: finite, not out
+//! of the workspace, and within velocity, acceleration and jerk of the last
+//! *command*, whatever was measured meanwhile. What is outside already stays
+//! or comes back, as it is asked to, and goes no further out.
 
 use kinematics::vector::{self, Vector3};
 
@@ -60,6 +61,48 @@ pub fn limit_action(
         value,
         limited: value != *wanted,
     }
+}
+
+impl Filter {
+    /// True if `p` lies in the workspace; false for a NaN.
+    #[must_use]
+    pub fn contains(&self, p: Vector3) -> bool {
+        is_in(self.workspace(), p)
+    }
+
+    /// Least and greatest corner of the workspace, base frame, m.
+    #[must_use]
+    pub const fn workspace(&self) -> [Vector3; 2] {
+        [
+            [
+                self.workspace_min_x_m,
+                self.workspace_min_y_m,
+                self.workspace_min_z_m,
+            ],
+            [
+                self.workspace_max_x_m,
+                self.workspace_max_y_m,
+                self.workspace_max_z_m,
+            ],
+        ]
+    }
+
+    /// The same, large enough for `p`: what is outside may stay or come back,
+    /// but go no further out.
+    #[must_use]
+    pub fn workspace_and(&self, p: Vector3) -> [Vector3; 2] {
+        let ([lower, upper], [x, y, z]) = (self.workspace(), p);
+        let ([lx, ly, lz], [ux, uy, uz]) = (lower, upper);
+        [
+            [lx.min(x), ly.min(y), lz.min(z)],
+            [ux.max(x), uy.max(y), uz.max(z)],
+        ]
+    }
+}
+
+fn is_in([lower, upper]: [Vector3; 2], p: Vector3) -> bool {
+    let mut axes = p.iter().zip(lower).zip(upper);
+    axes.all(|((&x, lo), hi)| x >= lo && x <= hi)
 }
 
 /// The action of a hold: no increment, the gripper as it was.
@@ -127,7 +170,7 @@ impl Commanded {
         let within = |v: Vector3, limit: f64| v.iter().all(|x| x.abs() <= limit * slack);
         let rate =
             |now: Vector3, before: Vector3| vector::scale(vector::sub(now, before), 1.0 / dt_s);
-        limits.contains(wanted.position_m)
+        is_in(limits.workspace_and(self.position_m), wanted.position_m)
             && within(
                 rate(wanted.position_m, self.position_m),
                 limits.velocity_m_s,
@@ -148,7 +191,7 @@ impl Commanded {
     /// limited first, then the acceleration, then the velocity.
     fn axis(&self, limits: &Filter, wanted_m: Vector3, axis: usize, dt_s: f64) -> (f64, f64, f64) {
         let pick = |v: Vector3| v.get(axis).copied().unwrap_or(0.0);
-        let [lower, upper] = limits.workspace().map(pick);
+        let [lower, upper] = limits.workspace_and(self.position_m).map(pick);
         let (p, v, a) = (
             pick(self.position_m),
             pick(self.velocity_m_s),
@@ -162,7 +205,7 @@ impl Commanded {
         let velocity = clip(v + acceleration * dt_s, limits.velocity_m_s);
         let acceleration = (velocity - v) / dt_s;
         (
-            (p + velocity * dt_s).max(lower.min(p)).min(upper.max(p)),
+            (p + velocity * dt_s).max(lower).min(upper),
             velocity,
             acceleration,
         )

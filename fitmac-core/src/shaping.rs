@@ -6,7 +6,7 @@
 
 use kinematics::{
     otg::{Input, Limits, Otg, State, Target},
-    rotation::UnitQuaternion,
+    rotation::{self, UnitQuaternion},
     vector::{self, Vector3},
 };
 
@@ -55,18 +55,14 @@ impl Shaper {
     }
 
     /// A new action starts: its goal is the measured pose plus the increment,
-    /// kept inside the workspace.
+    /// which does not lead out of the workspace.
     pub(crate) fn aim(&mut self, params: &Params, sample: &StateSample, action: &Action) {
         let [x, y, z, rx, ry, rz, _] = *action;
         let step = vector::scale([x, y, z], params.action.translation_m);
-        let goal = vector::add(sample.ee_position_m, step);
-        let [lower, upper] = params.filter.workspace();
-        let inside = |i: usize, x: f64| match (lower.get(i), upper.get(i)) {
-            (Some(&lo), Some(&hi)) => x.max(lo).min(hi),
-            _ => x,
-        };
-        let [gx, gy, gz] = goal;
-        let position = [inside(0, gx), inside(1, gy), inside(2, gz)];
+        let [gx, gy, gz] = vector::add(sample.ee_position_m, step);
+        let [lower, upper] = params.filter.workspace_and(sample.ee_position_m);
+        let ([lx, ly, lz], [ux, uy, uz]) = (lower, upper);
+        let position = [gx.max(lx).min(ux), gy.max(ly).min(uy), gz.max(lz).min(uz)];
         self.translation_goal = Target::Reach {
             position,
             velocity: [0.0; 3],
@@ -79,17 +75,19 @@ impl Shaper {
         }
     }
 
+    /// The rotation goes on from where it is: its vector stays short, however far the hand turns.
     fn aim_rotation(&mut self, goal: UnitQuaternion) {
-        // At rest the base may move along, so that the rotation vector stays short.
-        if self.rotation.state().velocity == [0.0; 3]
-            && self.rotation.state().acceleration == [0.0; 3]
-        {
-            self.rotation_base = self.orientation();
-            self.rotation = Otg::new(State::at_rest([0.0; 3]));
-        }
-        let position = (goal * self.rotation_base.inverse()).to_rotation_vector();
+        let now = self.rotation.state();
+        let (velocity, acceleration) =
+            rotation::angular_motion(now.position, now.velocity, now.acceleration);
+        self.rotation_base = self.orientation();
+        self.rotation = Otg::new(State {
+            position: [0.0; 3],
+            velocity,
+            acceleration,
+        });
         self.rotation_goal = Target::Reach {
-            position,
+            position: (goal * self.rotation_base.inverse()).to_rotation_vector(),
             velocity: [0.0; 3],
         };
     }

@@ -308,3 +308,70 @@ impl Mul for UnitQuaternion {
         }
     }
 }
+
+/// Angular velocity, rad/s, and angular acceleration, rad/s^2, of a rotation whose rotation vector
+/// is `v`, rad, and changes by `rate` and `acceleration`; all in the frame that the rotation leads
+/// from. With the left Jacobian of SO(3), `omega = J(v) v'`, and its derivative (Sola, Deray,
+/// Atchuthan, "A micro Lie theory for state estimation in robotics", arXiv 1812.01537).
+#[must_use]
+pub fn angular_motion(v: Vector3, rate: Vector3, acceleration: Vector3) -> (Vector3, Vector3) {
+    let [a, b, da, db] = jacobian_series(dot(v, v));
+    let once = cross(v, rate);
+    let twice = cross(v, once);
+    let once_later = cross(v, acceleration);
+    let twice_later = add(cross(rate, once), cross(v, once_later));
+    let along = dot(v, rate);
+    let weighed = |k: f64, x: Vector3, l: f64, y: Vector3| add(scale(x, k), scale(y, l));
+    let of_factors = weighed(da * along, once, db * along, twice);
+    let of_products = weighed(a, once_later, b, twice_later);
+    (
+        add(rate, weighed(a, once, b, twice)),
+        add(acceleration, add(of_factors, of_products)),
+    )
+}
+
+/// For `t`, the square of an angle x: `a = (1 - cos x) / x^2`, `b = (x - sin x) / x^3`, and
+/// `da/dx / x`, `db/dx / x`.
+fn jacobian_series(t: f64) -> [f64; 4] {
+    if t < 0.25 {
+        // Closed forms lose their digits near 0.
+        let series = |[c0, c1, c2, c3, c4]: [f64; 5]| c0 + t * (c1 + t * (c2 + t * (c3 + t * c4)));
+        return [
+            series([
+                1.0 / 2.0,
+                -1.0 / 24.0,
+                1.0 / 720.0,
+                -1.0 / 40320.0,
+                1.0 / 3_628_800.0,
+            ]),
+            series([
+                1.0 / 6.0,
+                -1.0 / 120.0,
+                1.0 / 5040.0,
+                -1.0 / 362_880.0,
+                1.0 / 39_916_800.0,
+            ]),
+            series([
+                -1.0 / 12.0,
+                1.0 / 180.0,
+                -1.0 / 6720.0,
+                1.0 / 453_600.0,
+                -1.0 / 47_900_160.0,
+            ]),
+            series([
+                -1.0 / 60.0,
+                1.0 / 1260.0,
+                -1.0 / 60480.0,
+                1.0 / 4_989_600.0,
+                -1.0 / 622_702_080.0,
+            ]),
+        ];
+    }
+    let x = sqrt(t);
+    let (s, c) = sincos(x);
+    let (a, b) = ((1.0 - c) / t, (x - s) / (x * t));
+    [a, b, (s / x - 2.0 * a) / t, (a - 3.0 * b) / t]
+}
+
+#[cfg(test)]
+mod tests;

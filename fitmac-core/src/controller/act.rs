@@ -216,3 +216,6 @@ impl Controller {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

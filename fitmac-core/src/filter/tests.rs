@@ -132,11 +132,37 @@ fn what_asks_too_much_gets_the_jerk_then_the_acceleration_then_the_velocity() {
     assert_eq!(next(&brisk, from(-1.0, 0.0, 2.0), 1.0), [0.0, 2.0, 4.0]);
     // Velocity 1 at most; the acceleration is what it took.
     assert_eq!(next(&limits(), from(-0.5, 0.5, 0.0), 1.0), [0.0, 1.0, 1.0]);
-    // A goal outside is the edge; a setpoint that is outside itself comes back.
+    // A goal outside is the edge.
     let edge = next(&limits(), from(0.75, 0.0, 0.0), 5.0);
     assert_eq!(edge, [1.0, 0.5, 1.0]);
-    let back = next(&limits(), from(1.5, 0.0, 0.0), 5.0);
+    // What is outside goes no further out, nor back unless it is asked to.
+    let out = next(&limits(), from(1.5, 0.0, 0.0), 5.0);
+    assert_eq!(out, [1.5, 0.0, 0.0]);
+    let back = next(&limits(), from(1.5, 0.0, 0.0), 0.0);
     assert_eq!(back, [1.0, -1.0, -2.0]);
+}
+
+#[test]
+fn outside_the_workspace_no_wish_is_pulled_back_and_none_goes_further_out() {
+    for axis in 0..3 {
+        for side in [1.0, -1.0] {
+            let at = |x: f64| {
+                let mut place = Commanded::at_rest([0.0; 3]);
+                place.position_m[axis] = side * x;
+                place
+            };
+            let passes = |from: f64, to: f64| {
+                let out = at(from).step(&limits(), &at(to), DT_S);
+                assert!(out.limited || out.value == at(to));
+                !out.limited
+            };
+            assert!(passes(1.5, 1.5), "it stays");
+            assert!(passes(1.5, 1.25), "it comes back");
+            assert!(!passes(1.5, 1.5_f64.next_up()), "it goes further out");
+            assert!(passes(0.75, 1.0), "to the edge");
+            assert!(!passes(0.75, 1.0_f64.next_up()), "and beyond");
+        }
+    }
 }
 
 #[test]

@@ -91,32 +91,3 @@ pub fn recovery_action(
         .map(|r| (r / scale.rotation_rad).clamp(-1.0, 1.0));
     Some([x, y, z, rx, ry, rz, motion.grip.value()])
 }
-
-impl Filter {
-    /// True if `p` lies in the workspace; false for a NaN.
-    #[must_use]
-    pub fn contains(&self, p: Vector3) -> bool {
-        let [lower, upper] = self.workspace();
-        p.iter()
-            .zip(lower)
-            .zip(upper)
-            .all(|((&x, lo), hi)| x >= lo && x <= hi)
-    }
-
-    /// Least and greatest corner of the workspace, base frame, m.
-    #[must_use]
-    pub const fn workspace(&self) -> [Vector3; 2] {
-        [
-            [
-                self.workspace_min_x_m,
-                self.workspace_min_y_m,
-                self.workspace_min_z_m,
-            ],
-            [
-                self.workspace_max_x_m,
-                self.workspace_max_y_m,
-                self.workspace_max_z_m,
-            ],
-        ]
-    }
-}

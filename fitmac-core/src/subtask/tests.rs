@@ -4,7 +4,7 @@ use super::*;
 use crate::{
     message::{CANDIDATE_CAPACITY, Candidate},
     signals::OtherView,
-    stand::hand,
+    stand::{hand, surface, target},
     wire::{DestinationKind, Phase, PlaceRelation},
 };
 
@@ -133,4 +133,101 @@ fn a_rebind_to_another_target_leaves_nothing_of_the_old_one() {
     assert_eq!(subtask.tracking, Tracking::new());
     observe(&mut subtask);
     assert_eq!(subtask.since_rebind(), Some(1));
+}
+
+/// An estimator that saw the target lifted and carried, and let go then.
+fn carried(params: &Params, let_go: bool) -> PhaseEstimator {
+    let mut estimator = PhaseEstimator::new();
+    let mut step = |state, z_m| {
+        let signals = sees(state, z_m);
+        estimator.step(&params.phase, &signals);
+    };
+    step(GripperState::Open, 0.0);
+    for _ in 0..20 {
+        step(GripperState::Holding, 0.3);
+    }
+    if let_go {
+        step(GripperState::Open, 0.3);
+    }
+    estimator
+}
+
+/// A hand above a target at this height.
+fn sees(state: GripperState, z_m: f64) -> Signals {
+    Signals {
+        target: Some(target([0.4, 0.0, z_m])),
+        ..hand([0.4, 0.0, z_m + 0.2], state)
+    }
+}
+
+#[test]
+fn what_is_carried_is_placed_where_its_destination_is_seen() {
+    let mut params = Params::guarded();
+    let mut subtask = Subtask::fresh(0, 0);
+    subtask.commit(&record(1, 0.0));
+    let mut seen = sees(GripperState::Holding, 0.3);
+    subtask.signals = Some(seen);
+    assert_eq!(subtask.routine(&params), Routine::Pick);
+    subtask.estimator = carried(&params, false);
+    assert_eq!(subtask.estimator.phase(), Phase::Transport);
+    assert_eq!(subtask.routine(&params), Routine::Indirect, "not seen");
+    params.switches.hard_place = false;
+    assert_eq!(
+        subtask.routine(&params),
+        Routine::Place,
+        "for the gate to say no"
+    );
+    params.switches.hard_place = true;
+    seen.destination = Some(surface([0.6, 0.0, 0.0]));
+    subtask.signals = Some(seen);
+    assert_eq!(subtask.routine(&params), Routine::Place);
+}
+
+/// A subtask whose pick recovery has come to this step.
+fn recovering(params: &Params, to: SubPhase) -> Subtask {
+    let mut subtask = Subtask::fresh(0, 0);
+    let mut sample = StateSample::default();
+    let mut seen = sees(GripperState::Open, 0.03);
+    subtask
+        .recovery
+        .start(&Scene::new(params, &sample, &seen), Routine::Pick, 100);
+    for _ in 0..50 {
+        if subtask.recovery.sub_phase() == to {
+            break;
+        }
+        // The hand is at once where it is sent.
+        let step = subtask.recovery.step(&Scene::new(params, &sample, &seen));
+        if let crate::recovery::Step::Act {
+            waypoint_m: Some(at_m),
+            ..
+        } = step
+        {
+            (seen.ee_m, sample.ee_position_m) = (at_m, at_m);
+        }
+    }
+    assert_eq!(subtask.recovery.sub_phase(), to);
+    subtask
+}
+
+#[test]
+fn a_pick_begins_a_new_attempt_with_an_open_hand_or_where_the_target_was_let_go() {
+    let params = Params::guarded();
+    let begins = |at: SubPhase, estimator: PhaseEstimator| {
+        let mut subtask = recovering(&params, at);
+        subtask.estimator = estimator;
+        let before = subtask.attempt.id();
+        subtask.follow_recovery();
+        let fresh = subtask.estimator == PhaseEstimator::new();
+        assert!(subtask.attempt.id() == before || fresh);
+        subtask.attempt.id() > before
+    };
+    let (held, gone) = (carried(&params, false), carried(&params, true));
+    assert_eq!(gone.carry(), Carry::Released);
+    for open_handed in [SubPhase::ApproachHover, SubPhase::Descend] {
+        assert!(begins(open_handed, held.clone()), "{open_handed}");
+        assert!(begins(open_handed, gone.clone()), "{open_handed}");
+        assert!(!begins(open_handed, PhaseEstimator::new()), "{open_handed}");
+    }
+    assert!(!begins(SubPhase::Close, held), "it is in the hand");
+    assert!(begins(SubPhase::Close, gone));
 }

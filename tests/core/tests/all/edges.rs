@@ -9,11 +9,13 @@ use fitmac_core::{
     filter::{Commanded, limit_action},
     message::{Input, StateSample},
     recovery::{
+        EDGES,
         geometry::levelling,
+        is_legal,
         waypoint::{Grip, Motion, recovery_action},
     },
     signals::TargetView,
-    wire::{GraspClass, Phase, Route},
+    wire::{GraspClass, Phase, Route, SubPhase},
 };
 use fitmac_core_tests::world::{Agent, Behaviour, Policy, Scene, Session};
 use kinematics::rotation::UnitQuaternion;
@@ -24,6 +26,16 @@ const EE_M: [f64; 3] = [0.4, 0.0, 0.3];
 fn a_code_without_a_member_says_of_which_vocabulary() {
     let error = Phase::try_from(200).expect_err("no such phase");
     assert_eq!(error.to_string(), "Phase has no member 200");
+}
+
+#[test]
+fn only_the_listed_changes_of_a_recoverys_step_are_legal() {
+    let all = || SubPhase::ALL.iter().copied();
+    let legal = all().flat_map(|from| all().map(move |to| (from, to)));
+    let legal: Vec<_> = legal.filter(|&(from, to)| is_legal(from, to)).collect();
+    assert_eq!(legal.len(), EDGES.len());
+    assert!(EDGES.iter().all(|edge| legal.contains(edge)));
+    assert!(!is_legal(SubPhase::Idle, SubPhase::Retreat));
 }
 
 #[test]

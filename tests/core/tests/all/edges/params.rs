@@ -169,3 +169,15 @@ fn an_empty_hand_is_narrower_than_a_closed_one() {
     assert!(!broken(0.03125_f64.next_down()));
     assert!(broken(0.03125));
 }
+
+#[test]
+fn every_violation_is_told_in_one_sentence() {
+    let mut params = Params::guarded();
+    params.gate.confidence = 2.0;
+    let one = params.validate().expect_err("out of range").to_string();
+    assert_eq!(one, "gate.confidence is 2, allowed is 0 to 1");
+    params.state.hold_age_ms = params.state.stop_age_ms;
+    let two = params.validate().expect_err("out of range").to_string();
+    let relation = "state: hold_age_ms must be below stop_age_ms (500)";
+    assert_eq!(two, format!("{one}; {relation}"));
+}

@@ -14,7 +14,7 @@ use fitmac_core::{
 use kinematics::{
     otg::{self, Limits, Otg, State, Target},
     rotation::UnitQuaternion,
-    vector,
+    vector::{self, Vector3},
 };
 
 const TICK_NS: u64 = 4_000_000;
@@ -162,20 +162,26 @@ fn a_stop_brakes_from_its_first_tick_as_hard_as_the_limits_allow_and_then_stays(
 }
 
 #[test]
-fn a_hand_outside_the_workspace_is_said_to_be_limited_in_action_and_setpoint_alike() {
+fn a_hand_outside_the_workspace_stays_or_comes_back_as_it_is_asked() {
     let mut params = Params::guarded();
     params.filter.workspace_max_x_m = EE_M[0] - 0.1;
-    // Farther out: the action is cut, and the setpoint cannot be where the hand is.
-    let mut stand = Stand::new(params, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0]);
-    stand.tick(None); // No time has passed yet.
-    let mut cut = 0;
-    for n in 1..100 {
-        let command = stand.tick(None);
-        assert_ne!(command.flags & Command::LIMITED, 0, "tick {n}");
-        assert_ne!(command.reasons & reason::LIMITED, 0, "tick {n}");
-        cut += u32::from(command.policy_step > 0 && command.action[0] == 0.0);
+    for x in [1.0, 0.0, -1.0] {
+        let mut stand = Stand::new(params, [x, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0]);
+        let mut last = stand.tick(None);
+        for n in 0..200 {
+            let before = last;
+            last = stand.tick(None);
+            let moved_m = last.setpoint_position_m[0] - before.setpoint_position_m[0];
+            assert!(moved_m <= 0.0, "{x}, tick {n}: {moved_m} m further out");
+            // The wish to go out is cut, and it is said so.
+            let cut = last.policy_step > 0 && x > 0.0;
+            assert_eq!(last.flags & Command::LIMITED != 0, cut, "{x}, tick {n}");
+            assert_eq!(last.reasons & reason::LIMITED != 0, cut, "{x}, tick {n}");
+        }
+        assert_eq!(last.action[0], x.min(0.0));
+        let goal_m = EE_M[0] + x.min(0.0) * params.action.translation_m;
+        assert!((last.setpoint_position_m[0] - goal_m).abs() < 1e-9, "{x}");
     }
-    assert!(cut > 50, "{cut}");
 }
 
 #[test]
@@ -192,4 +198,72 @@ fn only_a_command_beyond_the_middle_closes_fingers_that_stand_wide() {
     assert_eq!(state(-1.0), Some(GripperState::Open));
     assert_eq!(state(0.0), Some(GripperState::Open));
     assert_eq!(state(1.0), Some(GripperState::Holding));
+}
+
+/// The hand follows at once, and turns as this action says, again and again.
+fn turning(action: Action, ticks: usize) -> Vec<Vector3> {
+    let mut stand = Stand::new(Params::guarded(), action);
+    let mut last = UnitQuaternion::IDENTITY;
+    let mut velocities = Vec::new();
+    for _ in 0..ticks {
+        let command = stand.tick(None);
+        stand.sample.ee_orientation = command.setpoint_orientation;
+        let now = UnitQuaternion::from_wxyz(command.setpoint_orientation).expect("a rotation");
+        let turned = (now * last.inverse()).to_rotation_vector();
+        velocities.push(vector::scale(turned, 1e9 / TICK_NS as f64));
+        last = now;
+    }
+    velocities
+}
+
+#[test]
+fn a_hand_may_turn_on_and_on() {
+    for action in [
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.4, -1.0],
+        [0.0, 0.0, 0.0, 0.3, -0.2, 0.2, -1.0],
+    ] {
+        let velocities = turning(action, 2000);
+        let [.., rx, ry, rz, _] = action;
+        let axis = vector::scale([rx, ry, rz], 1.0 / vector::norm([rx, ry, rz]));
+        let (begun, rest) = velocities.split_at(100);
+        assert!(begun.iter().all(|v| vector::dot(*v, axis) > -1e-9));
+        // Several turns, never slower than half of what it came to, and about the same axis.
+        let speed = vector::norm(rest[0]);
+        for (n, v) in rest.iter().enumerate() {
+            let along = vector::dot(*v, axis);
+            assert!(along > 0.5 * speed, "{n}: {along} of {speed} rad/s");
+            assert!(vector::norm(*v) - along < 0.02 * speed, "{n}: {v:?}");
+        }
+        assert!(speed * 8.0 > 2.0 * core::f64::consts::TAU, "{speed}");
+    }
+}
+
+#[test]
+fn its_rotation_keeps_its_limits_through_every_change_of_goal() {
+    let p = Params::guarded().shaping;
+    let dt_s = 1e-9 * TICK_NS as f64;
+    let mut stand = Stand::new(Params::guarded(), ACTION);
+    let mut last = UnitQuaternion::IDENTITY;
+    let mut velocities: Vec<Vector3> = Vec::new();
+    for n in 0..1500_i32 {
+        // A new axis every time, and a rest now and then.
+        let phase = 0.7 * f64::from(n / 25);
+        let size = if n % 200 < 150 { 0.6 } else { 0.0 };
+        let turn = [phase.sin(), phase.cos(), (2.3 * phase).sin()].map(|x| size * x);
+        stand.action[3..6].copy_from_slice(&turn);
+        let command = stand.tick(None);
+        stand.sample.ee_orientation = command.setpoint_orientation;
+        let now = UnitQuaternion::from_wxyz(command.setpoint_orientation).expect("a rotation");
+        let turned = (now * last.inverse()).to_rotation_vector();
+        velocities.push(vector::scale(turned, 1.0 / dt_s));
+        last = now;
+    }
+    // Limits are an axis each; differences of samples and the bend of the path blur them.
+    let change = |two: &[Vector3]| vector::scale(vector::sub(two[1], two[0]), 1.0 / dt_s);
+    let accelerations: Vec<Vector3> = velocities.windows(2).map(change).collect();
+    let jerks: Vec<Vector3> = accelerations.windows(2).map(change).collect();
+    let greatest = |all: &[Vector3]| all.iter().flatten().fold(0.0_f64, |a, x| a.max(x.abs()));
+    assert!(greatest(&velocities) <= 1.02 * p.angular_velocity_rad_s);
+    assert!(greatest(&accelerations) <= 1.1 * p.angular_acceleration_rad_s2);
+    assert!(greatest(&jerks) <= 1.1 * p.angular_jerk_rad_s3);
 }
