@@ -39,6 +39,8 @@ pub struct Shaper {
     rotation: Otg<3>,
     rotation_goal: Target<3>,
     rotation_base: UnitQuaternion,
+    /// The last setpoint's.
+    orientation: UnitQuaternion,
 }
 
 impl Shaper {
@@ -51,6 +53,7 @@ impl Shaper {
             rotation: Otg::new(State::at_rest([0.0; 3])),
             rotation_goal: Target::Stop,
             rotation_base: pose.orientation,
+            orientation: pose.orientation,
         }
     }
 
@@ -80,7 +83,7 @@ impl Shaper {
         let now = self.rotation.state();
         let (velocity, acceleration) =
             rotation::angular_motion(now.position, now.velocity, now.acceleration);
-        self.rotation_base = self.orientation();
+        self.rotation_base = self.orientation;
         self.rotation = Otg::new(State {
             position: [0.0; 3],
             velocity,
@@ -107,10 +110,6 @@ impl Shaper {
         self.rotation_goal = Target::Stop;
     }
 
-    fn orientation(&self) -> UnitQuaternion {
-        UnitQuaternion::from_rotation_vector(self.rotation.state().position) * self.rotation_base
-    }
-
     /// The setpoint `dt_s` later.
     pub(crate) fn step(&mut self, params: &Params, dt_s: f64) -> Setpoint {
         let p = &params.shaping;
@@ -135,18 +134,20 @@ impl Shaper {
                 dt_s,
             )
             .state;
-        self.rotation.update(
+        let turned = self.rotation.update(
             &Input {
                 target: self.rotation_goal,
                 limits: angular,
             },
             dt_s,
         );
+        self.orientation =
+            UnitQuaternion::from_rotation_vector(turned.state.position) * self.rotation_base;
         Setpoint {
             position_m: moved.position,
             velocity_m_s: moved.velocity,
             acceleration_m_s2: moved.acceleration,
-            orientation: self.orientation(),
+            orientation: self.orientation,
         }
     }
 }

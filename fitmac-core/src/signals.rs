@@ -223,10 +223,10 @@ fn target_view(
     TargetView {
         id: object.id,
         position_m,
-        orientation: orientation(object.orientation),
+        orientation: at.orientation,
         half_extent_m: object.half_extent_m,
         half_height_m: at.half_height_m,
-        depth_m: depth(object),
+        depth_m: depth(&at, object.half_extent_m),
         class: at.class,
         distance_m: vector::norm(offset),
         distance_xy_m: vector::norm([offset[0], offset[1], 0.0]),
@@ -263,6 +263,7 @@ pub fn grasp_radius(grasp: &Grasp, class: GraspClass, half_extent_m: Vector3) ->
 struct GraspSite {
     position_m: Vector3,
     class: GraspClass,
+    orientation: UnitQuaternion,
     radius_xy_m: [f64; 2],
     half_height_m: f64,
 }
@@ -270,11 +271,13 @@ struct GraspSite {
 impl GraspSite {
     fn of(object: &ObjectSample) -> Self {
         let [hx, hy, _] = object.half_extent_m;
+        let orientation = orientation(object.orientation);
         Self {
             position_m: object.position_m,
             class: class(object),
+            orientation,
             radius_xy_m: [hx, hy],
-            half_height_m: half_height(object),
+            half_height_m: turned_half_height(orientation, object.half_extent_m),
         }
     }
 
@@ -300,23 +303,24 @@ impl GraspSite {
 /// Half the height of the object's bounding box as it stands or lies, m.
 #[must_use]
 pub fn half_height(object: &ObjectSample) -> f64 {
-    let rows = orientation(object.orientation).to_matrix();
-    let [_, _, [zx, zy, zz]] = rows;
-    let [hx, hy, hz] = object.half_extent_m;
+    turned_half_height(orientation(object.orientation), object.half_extent_m)
+}
+
+fn turned_half_height(orientation: UnitQuaternion, half_extent_m: Vector3) -> f64 {
+    let [_, _, [zx, zy, zz]] = orientation.to_matrix();
+    let [hx, hy, hz] = half_extent_m;
     zx.abs() * hx + zy.abs() * hy + zz.abs() * hz
 }
 
-/// An object's centre above its underside, m.
-fn depth(object: &ObjectSample) -> f64 {
-    let [hx, hy, hz] = object.half_extent_m;
-    let foot = match class(object) {
-        GraspClass::Bowl => FOOT_SHARE,
-        _ => 1.0,
-    };
-    half_height(&ObjectSample {
-        half_extent_m: [foot * hx, foot * hy, hz],
-        ..*object
-    })
+/// An object's centre above its underside, m: a bowl stands on its foot.
+fn depth(at: &GraspSite, half_extent_m: Vector3) -> f64 {
+    let [hx, hy, hz] = half_extent_m;
+    match at.class {
+        GraspClass::Bowl => {
+            turned_half_height(at.orientation, [FOOT_SHARE * hx, FOOT_SHARE * hy, hz])
+        }
+        _ => at.half_height_m,
+    }
 }
 
 fn destination_view(

@@ -203,30 +203,33 @@ fn yaw_to_narrow_side(params: &Params, orientation: UnitQuaternion, target: &Tar
     let fits = |half: f64| 2.0 * half < 0.9 * params.gripper.open_width_m;
     let [hx, hy, _] = target.half_extent_m;
     let closing = orientation.rotate([0.0, 1.0, 0.0]);
+    // Sine and cosine of the turn along a side, both with the same factor.
     let turn = |axis: Vector3| {
         let side = target.orientation.rotate(axis);
         // Directions along the side are equivalent: fold the angle to a quarter turn.
         let cross = closing[0] * side[1] - closing[1] * side[0];
         let dot = closing[0] * side[0] + closing[1] * side[1];
         if dot < 0.0 {
-            libm::atan2(-cross, -dot)
+            (-cross, -dot)
         } else {
-            libm::atan2(cross, dot)
+            (cross, dot)
         }
     };
     let along_x = fits(hx).then(|| turn([1.0, 0.0, 0.0]));
     let along_y = fits(hy).then(|| turn([0.0, 1.0, 0.0]));
-    match (along_x, along_y) {
+    let (sine, cosine) = match (along_x, along_y) {
         (Some(x), Some(y)) => {
-            if x.abs() <= y.abs() {
+            // The smaller angle has the smaller tangent.
+            if x.0.abs() * y.1 <= y.0.abs() * x.1 {
                 x
             } else {
                 y
             }
         }
         (Some(turn), None) | (None, Some(turn)) => turn,
-        (None, None) => 0.0,
-    }
+        (None, None) => return 0.0,
+    };
+    libm::atan2(sine, cosine)
 }
 
 #[cfg(test)]
