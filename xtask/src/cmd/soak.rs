@@ -7,8 +7,9 @@ use crate::{process, workspace::Workspace};
 /// Arguments of `soak`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Control ticks to compare, at least; whole runs only.
-    #[arg(long, value_name = "N", default_value_t = 10_000_000)]
+    /// Control ticks to play, in whole runs; a run is cut short by a tie, which one in some
+    /// hundreds comes to.
+    #[arg(long, value_name = "N", default_value_t = 10_100_000)]
     ticks: u64,
     /// The first seed; the next ones follow.
     #[arg(long, value_name = "S", default_value_t = 0)]
