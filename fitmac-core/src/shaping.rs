@@ -151,3 +151,6 @@ impl Shaper {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -139,8 +139,10 @@ fn a_stop_brakes_from_its_first_tick_as_hard_as_the_limits_allow_and_then_stays(
         // No news of the robot leads to a hold, a request to a stop.
         stand.silent = least == Mode::Hold;
         let mut last = stand.tick((least == Mode::Stop).then_some(Request::Stop));
-        while last.mode() < Some(least) {
-            before = replace(&mut last, stand.tick(None));
+        for _ in 0..10 {
+            if last.mode() < Some(least) {
+                before = replace(&mut last, stand.tick(None));
+            }
         }
         let mut oracle = Otg::new(State {
             position: before.setpoint_position_m,
