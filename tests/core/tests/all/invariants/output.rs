@@ -9,6 +9,7 @@ use fitmac_core::{
     wire::{Mode, Route, SubPhase},
 };
 use fitmac_core_tests::world::{Agent, Behaviour, Policy, Scene};
+use kinematics::rotation::UnitQuaternion;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -378,7 +379,7 @@ fn inv_09_no_fault_opens_a_hand_that_carries() {
 
 #[test]
 fn inv_10_the_setpoint_keeps_its_limits_against_the_last_command() {
-    let mut moved = 0;
+    let (mut moved, mut turned) = (0, 0);
     let mut last: Option<(Command, u64)> = None;
     swarms(|seen| {
         let c = seen.output.command;
@@ -412,8 +413,21 @@ fn inv_10_the_setpoint_keeps_its_limits_against_the_last_command() {
             assert!(jerk_ok, "seed {}: {da} m/s^2 in {dt_s} s", seen.seed);
             moved += u32::from(dp > 0.0);
         }
+        // The rotation's limits are an axis each; its path may bend.
+        let speed = 3.0_f64.sqrt() * 1.05 * seen.params.shaping.angular_velocity_rad_s;
+        let angle = orientation(&p).angle_to(orientation(&c));
+        assert!(
+            angle <= speed * dt_s + 1e-6,
+            "seed {}: {angle} rad in {dt_s} s",
+            seen.seed
+        );
+        turned += u32::from(angle > 1e-6);
     });
-    assert!(moved > 1000);
+    assert!(moved > 1000 && turned > 200, "{moved} {turned}");
+}
+
+fn orientation(command: &Command) -> UnitQuaternion {
+    UnitQuaternion::from_wxyz(command.setpoint_orientation).expect("a rotation")
 }
 
 #[test]
