@@ -205,6 +205,7 @@ impl Track {
         }
         self.smoothed.confidence +=
             params.smoothing * (detection.confidence - self.smoothed.confidence);
+        self.smoothed.orientation = detection.orientation.or(self.smoothed.orientation);
         self.smoothed.box_px = detection.box_px.or(self.smoothed.box_px);
         self.smoothed.id = if detection.id == 0 {
             self.smoothed.id
@@ -328,6 +329,30 @@ mod tests {
         let index = back.index_of(lock).expect("the same bowl");
         assert!(back.scene.objects[index].position_m[0] < 0.41);
         assert_eq!(back.tracks.len(), 2);
+    }
+
+    #[test]
+    fn a_thing_that_is_turned_has_its_newest_orientation() {
+        let mut tracker = Tracker::new(TrackParams::default());
+        let turned = |orientation| Detection {
+            orientation,
+            ..bowl(0.4, 0.0)
+        };
+        let quarter = [
+            core::f64::consts::FRAC_1_SQRT_2,
+            0.0,
+            0.0,
+            core::f64::consts::FRAC_1_SQRT_2,
+        ];
+        let upright = [1.0, 0.0, 0.0, 0.0];
+        for (tick, (seen, expected)) in (0..).zip([
+            (Some(upright), Some(upright)),
+            (Some(quarter), Some(quarter)),
+            (None, Some(quarter)),
+        ]) {
+            let tracked = tracker.update(&scene(tick, vec![turned(seen)]));
+            assert_eq!(tracked.scene.objects[0].orientation, expected, "{tick}");
+        }
     }
 
     #[test]
